@@ -98,9 +98,3 @@ def test_accepted_verdicts_that_are_torn_are_not_written_over(evoclaims: Evoclai
     status, _, err = evoclaims("accept")
     assert (status, FILE.read_text()) == (2, "torn =")
     assert "verdicts.toml holds no accepted verdicts: it is no whole TOML file" in err
-
-
-def test_an_unknown_tier_is_one_sentence(evoclaims: Evoclaims) -> None:
-    status, _, err = evoclaims("accept", "--tier=ful")
-    assert status == 2
-    assert "There is no tier named 'ful'. Did you mean 'full'? Known: all, full, smoke." in err

@@ -11,6 +11,8 @@ from tiny_project import Evoclaims, Project
 from evoclaims.trials.store import Store
 
 MAKE = ("power", "--trials=12")
+FEW = ("power", "--draws=50")
+"""As many draws as it takes where no interval is read."""
 PILOT = Path("pilot/smoke")
 HALF = "verdict(trials('coin', on='parity').solves_every_level.in_most_trials())"
 
@@ -63,23 +65,21 @@ def test_a_pilot_is_run_once_and_read_ever_after(piloted: Evoclaims, stored: Sto
 
 
 def test_a_second_pilot_has_other_seeds_and_power_is_read_from_it_alone(piloted: Evoclaims, stored: Store) -> None:
-    assert "from its first pilot" in piloted("power")[1]
+    assert "from its first pilot" in piloted(*FEW)[1]
     first = {path: path.read_bytes() for path in PILOT.iterdir()}
     status, out, err = piloted(*MAKE, "--pilot=second", "--first-seed=105", "--run")
     assert (status, out) == (2, "")
     assert "The seeds 105 to 116 overlap those of the other pilot (105 to 111)" in err
-    status, out, _ = piloted(*MAKE, "--pilot=second", "--run", "--only=a")
+    status, out, _ = piloted(*MAKE, "--draws=50", "--pilot=second", "--run", "--only=a")
     assert (status, out.count("wrote"), "from its second pilot" in out) == (0, 1, True)
     assert {trial.seed for trial in stored.results([])} == {*range(10), *range(100, 112), *range(150, 162)}
     assert {path: path.read_bytes() for path in PILOT.iterdir()} == first
-    status, out, err = piloted("power")
+    status, out, err = piloted(*FEW)
     assert (status, rows(out)["a"][1], rows(out)["b"][1]) == (1, "1.000", "unknown")
     assert "b: no pilot of wrong on parity (it has not been made)" in out
-    assert piloted("power", "--pilot=first")[1].count("unknown") == 0
+    assert piloted(*FEW, "--pilot=first")[1].count("unknown") == 0
     shutil.copy(PILOT / "right-parity.jsonl", "second_pilot/smoke/right-parity.jsonl")
-    assert (
-        "a: no pilot of right on parity (it has seeds of the first pilot (100, 101, " in piloted("power", "--only=a")[2]
-    )
+    assert "a: no pilot of right on parity (it has seeds of the first pilot (100, 101, " in piloted(*FEW, "--only=a")[2]
 
 
 def test_a_refutation_is_what_an_accepted_claim_is_expected_to_end_as(piloted: Evoclaims, project: Project) -> None:
@@ -101,15 +101,15 @@ def test_c(trials, verdict):
 
 def test_claims_can_be_chosen_and_only_their_pilots_are_needed(piloted: Evoclaims, project: Project) -> None:
     project.write(a="supported", c=HALF)
-    status, out, err = piloted("power")
+    status, out, err = piloted(*FEW)
     assert status == 1
     assert "c: no pilot of coin on parity (it has not been made)" in out
     assert "`evoclaims power --run` runs and writes the pilots that are missing." in err
     assert (rows(out)["a"][1], rows(out)["c"][1]) == ("1.000", "unknown")
-    assert (piloted("power", "--only=a")[0], piloted("power", "--only=a,c")[0]) == (0, 1)
-    status, _, err = piloted("power", "--only=d")
+    assert (piloted(*FEW, "--only=a")[0], piloted(*FEW, "--only=a,c")[0]) == (0, 1)
+    status, _, err = piloted(*FEW, "--only=d")
     assert (status, "There is no claim named 'd'." in err) == (2, True)
-    status, out, _ = piloted(*MAKE, "--run", "--only=c")
+    status, out, _ = piloted(*MAKE, "--draws=50", "--run", "--only=c")
     assert (status, out.count("wrote")) == (1, 1)
     assert "coin-parity.jsonl: 12 trials" in out
     assert rows(out)["c"][2] == "below"
@@ -120,27 +120,27 @@ def test_a_pilot_of_another_condition_is_refused_and_made_anew(piloted: Evoclaim
     right = PILOT / "right-parity.jsonl"
     before = right.read_bytes()
     shutil.copy(PILOT / "wrong-parity.jsonl", right)
-    status, out, _ = piloted("power")
+    status, out, _ = piloted(*FEW)
     assert status == 1
     assert (
         "a: no pilot of right on parity (it is of another condition, since method, task or budget have changed)" in out
     )
-    assert "wrote" in piloted(*MAKE, "--stored")[1]
+    assert "wrote" in piloted(*MAKE, "--draws=50", "--stored")[1]
     assert right.read_bytes() == before
 
 
 def test_trials_that_have_not_run_are_not_written(piloted: Evoclaims) -> None:
     shutil.rmtree(PILOT)
-    status, out, err = piloted("power", "--trials=13", "--stored")
+    status, out, err = piloted(*FEW, "--trials=13", "--stored")
     assert (status, err.count("\n"), PILOT.exists()) == (2, 1, False)
     assert "left alone: right on parity: 12 of 13 trials are stored, counted from seed 100" in out
-    assert piloted("power", "--trials=13", "--first-seed=200", "--stored")[:2] == (2, "")
+    assert piloted(*FEW, "--trials=13", "--first-seed=200", "--stored")[:2] == (2, "")
 
 
 def test_a_condition_that_breaks_does_not_stop_the_others(piloted: Evoclaims, project: Project) -> None:
     shutil.rmtree(PILOT)
     project.write(a="supported", d="error")
-    status, out, err = piloted(*MAKE, "--run")
+    status, out, err = piloted(*MAKE, "--draws=50", "--run")
     assert (status, rows(out)["a"][1]) == (1, "1.000")
     assert "broken on parity (smoke) failed: RuntimeError: out of order" in err
     assert "d: no pilot of broken on parity" in out
@@ -150,10 +150,7 @@ def test_a_condition_that_breaks_does_not_stop_the_others(piloted: Evoclaims, pr
     ("arguments", "said"),
     [
         (("--run", "--first-seed=5"), "The seeds 5 to 54 overlap the smoke tier's own (0 to 9)"),
-        (
-            ("--run", "--trials=9"),
-            "--trials takes 10 (as many as a verdict reads) to 100 trials per condition, not 9.",
-        ),
+        (("--run", "--trials=9"), "--trials takes 10 (as many as a verdict reads) to 100 trials per condition, not 9."),
         (("--stored", "--trials=101"), "to 100 trials per condition, not 101."),
         (("--run", "--first-seed=2147483647"), "A seed is a whole number from 0 to 2147483647"),
         (("--draws=0",), "--draws takes a number from 1 up, not 0."),

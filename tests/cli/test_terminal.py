@@ -27,7 +27,6 @@ READING = (
     ("accept",),
     ("compare",),
     ("export", "--as=csv"),
-    ("export", "--as=csv"),
     ("status", "--as=csv"),
     ("report",),
     ("champion", "right", "--on=parity"),

@@ -134,10 +134,7 @@ def test_another_python_with_pins_gets_this_program_first_and_then_the_release_o
 @pytest.mark.parametrize(
     ("origin", "asked"),
     [
-        (
-            {"url": "file:///our%20work/it", "dir_info": {"editable": True}},
-            ["--editable", "/our work/it"],
-        ),
+        ({"url": "file:///our%20work/it", "dir_info": {"editable": True}}, ["--editable", "/our work/it"]),
         ({"url": "file:///our%20work/it.whl", "archive_info": {}}, ["/our work/it.whl"]),
     ],
 )

@@ -93,19 +93,13 @@ def test_an_answer_of_0_is_the_bit_0() -> None:
 @pytest.mark.parametrize("second", [-1.0, 1.0])
 def test_the_delayed_reward_is_paid_by_the_second_step_for_the_first_answer(bit: float, second: float) -> None:
     waiting = (0.0, 1.0)
-    assert _play(DELAYED, (bit, 0.0), [bit, second]) == [
-        (waiting, 0.0, False, False),
-        (waiting, 1.0, True, False),
-    ]
+    assert _play(DELAYED, (bit, 0.0), [bit, second]) == [(waiting, 0.0, False, False), (waiting, 1.0, True, False)]
     assert _play(DELAYED, (bit, 0.0), [-bit, second])[1] == (waiting, -1.0, True, False)
 
 
 @pytest.mark.parametrize("bit", [-1.0, 1.0])
 def test_survival_terminates_on_an_error_and_truncates_at_the_horizon(bit: float) -> None:
-    assert _play(SURVIVAL, (bit,), [bit, -bit]) == [
-        ((-bit,), 1.0, False, False),
-        ((-bit,), 1.0, False, True),
-    ]
+    assert _play(SURVIVAL, (bit,), [bit, -bit]) == [((-bit,), 1.0, False, False), ((-bit,), 1.0, False, True)]
     assert _play(SURVIVAL, (bit,), [-bit])[0] == ((-bit,), -1.0, True, False)
     assert _play(SURVIVAL, (bit,), [bit, bit])[1] == ((-bit,), -1.0, True, False)
 

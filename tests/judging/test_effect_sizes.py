@@ -8,15 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoclaims.judging.effect import (
-    a12,
-    a12_interval,
-    cliffs_delta,
-    iqm,
-    iqm_interval,
-    median,
-    median_interval,
-)
+from evoclaims.judging.effect import a12, a12_interval, cliffs_delta, iqm, iqm_interval, median, median_interval
 
 values = st.lists(st.floats(-3, 3) | st.sampled_from([-math.inf, math.inf]), min_size=1, max_size=8)
 

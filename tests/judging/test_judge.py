@@ -108,12 +108,6 @@ def test_a_verdict_that_every_completion_reaches_is_given_early(source) -> None:
     assert "stopped early" in supported.reason
 
 
-def test_an_open_completion_is_not_curtailed(source) -> None:
-    a = source("a", [1.0] * 10)
-    assert judge(a.solved().in_most_trials(), SEQUENTIAL).outcome is Outcome.SUPPORTED
-    assert a.asked == [tuple(range(5)), tuple(range(10))]
-
-
 def test_a_claim_that_can_still_be_refuted_goes_on(source) -> None:
     a = source("a", [1.0, 1.0] + [0.0] * 8)
     verdict = judge(a.solved().in_most_trials(), SEQUENTIAL)
@@ -184,12 +178,6 @@ def test_a_source_that_returns_other_seeds_is_a_mistake(source, trial) -> None:
     a.trials[2] = trial(7, 1.0)
     with pytest.raises(ValueError, match="returned the seeds"):
         judge(a.solved().in_every_trial(), Design.fixed(3))
-
-
-def test_a_condition_named_twice_is_fetched_once(source) -> None:
-    a = source("a", [1.0] * 10)
-    judge(a.solved().stays() & a.score().between(0, 2), FIXED_10)
-    assert a.asked == [tuple(range(10))]
 
 
 def test_a_control_beside_a_test_waits_for_every_trial(source) -> None:

@@ -124,10 +124,7 @@ FUNCTIONS: dict[str, tuple[Callable[..., Any], tuple[Any, ...]]] = {
         lambda x, i, b: (i.astype(float), (x * 9).astype(int), b.astype(float), b.astype(int), i.astype(bool)),
         (X, I, B),
     ),
-    "sums": (
-        lambda x: (jnp.sum(x), jnp.prod(x), jnp.cumsum(x), jax.lax.cumsum(x, reverse=True), jnp.sum(x[:0])),
-        (X,),
-    ),
+    "sums": (lambda x: (jnp.sum(x), jnp.prod(x), jnp.cumsum(x), jax.lax.cumsum(x, reverse=True), jnp.sum(x[:0])), (X,)),
     "the extremes of nothing": (
         lambda x, i: (jnp.max(x[:0], initial=-3.0), jnp.max(i[:0], initial=0), jnp.all(x[:0] > 0)),
         (X, I),

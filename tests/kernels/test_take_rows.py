@@ -40,7 +40,7 @@ def _tree(rows: int, *shape: int) -> Any:
     return {"whole": jnp.asarray(numbers), "pair": (jnp.asarray(floats), jnp.arange(rows) * 2.0), "others": others}
 
 
-@settings(max_examples=40)  # nearly each compiles a program of its own
+@settings(max_examples=15)  # nearly each compiles a program of its own
 @given(
     st.integers(1, 7),
     arrays.array_shapes(min_dims=0, max_dims=2, max_side=5),

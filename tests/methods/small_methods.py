@@ -93,14 +93,7 @@ METHODS = {
         curriculum=200,
         selection=40,
     ),
-    "neat": Entry(
-        method=Neat(SMALL),
-        task=NParity(3),
-        cost=24 * 8,
-        other=Neat(PROBING),
-        curriculum=3000,
-        selection=30,
-    ),
+    "neat": Entry(method=Neat(SMALL), task=NParity(3), cost=24 * 8, other=Neat(PROBING), curriculum=3000, selection=30),
     "hyperneat": Entry(
         method=HyperNeat(replace(SMALL, activations=CPPN_FUNCTIONS), hidden=(4,)),
         task=NParity(3),
@@ -150,12 +143,7 @@ METHODS = {
         learns=False,
     ),
     "hand_built": Entry(
-        method=HandBuilt(),
-        task=NParity(3),
-        cost=8,
-        other=HandBuilt(negated=True),
-        keeps_the_best=False,
-        learns=False,
+        method=HandBuilt(), task=NParity(3), cost=8, other=HandBuilt(negated=True), keeps_the_best=False, learns=False
     ),
     "waypoints": Entry(
         method=Waypoints(),
@@ -167,11 +155,7 @@ METHODS = {
         examines=False,
     ),
     "neat_tensorneat": Entry(
-        method=NeatTensorneat(SMALL),
-        task=NParity(3),
-        cost=24 * 8,
-        other=NeatTensorneat(PROBING),
-        needs="tensorneat",
+        method=NeatTensorneat(SMALL), task=NParity(3), cost=24 * 8, other=NeatTensorneat(PROBING), needs="tensorneat"
     ),
     "hyperneat_tensorneat": Entry(
         method=HyperneatTensorneat(replace(SMALL, activations=CPPN_FUNCTIONS), hidden=(4,)),

@@ -127,11 +127,6 @@ def test_the_ith_best_gets_the_ith_weight_and_ties_go_by_index(fitness: list[flo
     np.testing.assert_array_equal(given_weights, wanted)
 
 
-def test_no_weight_is_averaged_away_however_many_tie() -> None:
-    shaped = ordinal_weights(jnp.zeros((POPULATION, 1)), jnp.zeros(POPULATION), None, Params)
-    np.testing.assert_array_equal(shaped, Params.weights)
-
-
 def _step_sizes(shaping: dict[str, Any], generations: int) -> np.ndarray[Any, Any]:
     """Run evosax's CMA-ES where every individual ties; return σ after each generation."""
     with implicit_promotions():
@@ -194,26 +189,6 @@ def _watched_generation(method: Any, task: Any, monkeypatch: pytest.MonkeyPatch)
         return method.step(key, task, jnp.zeros((), jnp.int32), state)[0], *seen
 
     return generation
-
-
-def test_the_mean_moves_by_the_weighted_best_half(benches: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
-    """Hansen 2016, Eqs. (41), (42) and (49), from the population that was evaluated, by loops."""
-    bench = benches["cma_es"]
-    generation = _watched_generation(bench.method, bench.task, monkeypatch)
-    state, population, fitness = generation(jax.random.key(2), bench.init())
-    after, population, fitness = map(np.asarray, (state.distribution.mean, population, fitness))
-    assert (fitness >= 0).all()  # evosax minimizes: it is told errors, of which some individual makes one
-    assert fitness.max() > 0
-    n = len(population)
-    log_weights = [np.log((n + 1) / 2) - np.log(rank + 1) for rank in range(n)]
-    positive = sum(weight for weight in log_weights if weight > 0)
-    order = sorted(range(n), key=lambda individual: (fitness[individual], individual))
-    mean = sum(
-        weight / positive * population[individual].astype(np.float64)
-        for weight, individual in zip(log_weights, order, strict=True)
-        if weight > 0
-    )
-    np.testing.assert_allclose(after, mean, atol=1e-5)
 
 
 def _generations_beside_the_tutorials(method: Any, task: Any, generations: int, monkeypatch: pytest.MonkeyPatch) -> Any:

@@ -231,14 +231,6 @@ def test_a_weight_grows_with_q_from_0_at_the_threshold_to_the_largest_at_1(
     assert (q - other) * (weight - _weigh(sizes, other)) >= 0
 
 
-@pytest.mark.parametrize(
-    ("q", "wanted"),
-    [(0.29, 0.0), (-0.29, 0.0), (0.3, 0.0), (0.65, 2.5), (-0.65, -2.5), (1.0, 5.0), (-1.0, -5.0)],
-)
-def test_the_papers_weights_by_hand(q: float, wanted: float) -> None:
-    assert _weigh((0.3, 5.0), q) == pytest.approx(wanted, abs=1e-6)
-
-
 def test_a_one_for_the_bias_is_appended_to_the_observation_and_to_nothing_else() -> None:
     network = _network(layered((3, 2, 1)))
     hidden, output = jnp.array([[0.5, -1.0, 0.25], [0.0, 0.0, 0.0]]), jnp.array([[2.0, 3.0]])

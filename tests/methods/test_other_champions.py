@@ -58,14 +58,13 @@ def test_neat_keeps_the_first_champion_until_an_episode_beats_it_and_evolves_as_
 
 
 def test_shared_starts_give_every_key_the_mean_of_the_same_episodes() -> None:
-    starts = jax.random.split(jax.random.key(3), 2)
-    shared = with_shared_starts(TASK, starts)
-
-    def policy(observation: jax.Array) -> jax.Array:
-        return jnp.tanh(observation[:4])
-
-    together, usual = (jax.jit(lambda key, of=of: of.episode(policy, key, LEVEL).fitness) for of in (shared, TASK))
-    one, other = (float(together(jax.random.key(seed))) for seed in (0, 1))
+    starts, task = jax.random.split(jax.random.key(3), 2), Chancy()
+    together, usual = (
+        jax.jit(lambda key, of=of: of.episode(jnp.tanh, key, LEVEL).fitness)
+        for of in (with_shared_starts(task, starts), task)
+    )
+    with jax.debug_key_reuse(False):  # the starts are meant to be used again
+        one, other = (float(together(jax.random.key(seed))) for seed in (0, 1))
     assert one == other == pytest.approx(np.mean([float(usual(start)) for start in starts]))
     assert float(usual(jax.random.key(0))) != one
 

@@ -31,10 +31,7 @@ from evoclaims.networks.graph import GraphNetwork
 from evoclaims.trials.result_making import is_sound
 
 SMALL = Settings(population=60, nodes=12, connections=30, species=Species(most=5))
-METHODS = {
-    "neat_tensorneat": NeatTensorneat(SMALL),
-    "hyperneat_tensorneat": HyperneatTensorneat(SMALL, hidden=(3,)),
-}
+METHODS = {"neat_tensorneat": NeatTensorneat(SMALL), "hyperneat_tensorneat": HyperneatTensorneat(SMALL, hidden=(3,))}
 LIVELY = Settings(
     population=64,
     nodes=20,

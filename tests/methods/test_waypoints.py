@@ -110,11 +110,7 @@ def test_a_straight_run_at_the_target_crosses_nothing_and_earns_no_bonus() -> No
 
 @pytest.mark.parametrize(
     "task",
-    [
-        SteppingStones(),
-        SteppingStones(robot=ANT, shows_goal=True),
-        DeceptiveMaze(difficulty="difficult"),
-    ],
+    [SteppingStones(), SteppingStones(robot=ANT, shows_goal=True), DeceptiveMaze(difficulty="difficult")],
     ids=["no goal shown", "ant", "other maze"],
 )
 def test_only_the_simplest_robot_that_sees_its_goal_is_steered(task: Any) -> None:

@@ -120,12 +120,7 @@ def test_the_level_is_the_first_one_whatever_is_asked() -> None:
 
 @pytest.mark.parametrize(
     ("fault", "paid"),
-    [
-        (faults.Blind, -1.0),
-        (faults.PaysNothing, 0.0),
-        (faults.ReversesReward, 1.0),
-        (faults.PaysAtRandom, None),
-    ],
+    [(faults.Blind, -1.0), (faults.PaysNothing, 0.0), (faults.ReversesReward, 1.0), (faults.PaysAtRandom, None)],
 )
 def test_steps_are_faulty_like_episodes(fault: type[Any], paid: float | None) -> None:
     task: Any = plant(fault, NParity(3, "sampled"))

@@ -133,12 +133,6 @@ def test_what_overflows_is_passed_on_as_0() -> None:
     assert (np.asarray(made) == 0).any()
 
 
-def test_a_genome_without_connections_says_0() -> None:
-    genomes = _random_genomes(3, 4, fill=0)
-    assert (np.asarray(genomes.connection_count) == 0).all()
-    np.testing.assert_array_equal(_answers(genomes, np.ones((3, INPUTS), np.float32)), 0)
-
-
 @pytest.mark.parametrize("widest", [1, 4, 16])
 def test_bits_depend_neither_on_the_batch_nor_on_the_lanes(widest: int, monkeypatch: pytest.MonkeyPatch) -> None:
     genomes = _random_genomes(1, 9)

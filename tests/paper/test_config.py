@@ -147,11 +147,7 @@ def test_a_module_without_a_reproduction_is_a_sentence(project: Path) -> None:
             "does not import: Take three (",
             4,
         ),
-        (
-            "from evoclaims.judging.design import Design\nP = Design.fixed(0)\n",
-            "does not import: A look takes",
-            2,
-        ),
+        ("from evoclaims.judging.design import Design\nP = Design.fixed(0)\n", "does not import: A look takes", 2),
     ],
 )
 def test_a_module_that_does_not_import_is_a_sentence_with_file_and_line(

@@ -83,9 +83,3 @@ def test_what_is_not_published_is_nothing(tmp_path: Path) -> None:
 def test_a_number_without_its_place_or_a_torn_plot_is_refused(tmp_path: Path, text: str, what: str) -> None:
     with pytest.raises(UserError, match=f"entries that are not as expected: {what}"):
         load_published(_write(tmp_path, text))
-
-
-def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
-    for path in (tmp_path / "absent.toml", _write(tmp_path, "[plots")):
-        with pytest.raises(UserError, match=f"Cannot read the published numbers in {path}"):
-            load_published(path)

@@ -28,12 +28,7 @@ REPORTS = [
 
 
 def test_support_that_no_fault_could_change_is_counted_apart() -> None:
-    assert [one.counted_as for one in REPORTS] == [
-        Tally.SUPPORTED,
-        Tally.INSENSITIVE,
-        Tally.REFUTED,
-        Tally.SUPPORTED,
-    ]
+    assert [one.counted_as for one in REPORTS] == [Tally.SUPPORTED, Tally.INSENSITIVE, Tally.REFUTED, Tally.SUPPORTED]
     assert table_cells.totals(REPORTS) == "2 supported, 1 supported but insensitive, 1 refuted"
     assert table_cells.faults(REPORTS) == "claims against planted faults: 1 sensitive, 2 insensitive, 1 not tried"
 

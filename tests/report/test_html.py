@@ -12,7 +12,7 @@ from html.parser import HTMLParser
 from urllib.parse import unquote_to_bytes
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from laboratory import HERE, Laboratory, better_solves, better_wins
 from unpacked import pieces, whole
@@ -89,6 +89,7 @@ def plain_shape(bench: tuple[Laboratory, ClaimReport]) -> list[tuple[str, list[s
     return _shape(whole(_page(*bench, "plain")))
 
 
+@settings(max_examples=40)  # each makes a whole page
 @given(st.text(min_size=1).filter(lambda text: not places(text)[0].startswith("§")))  # sections are chosen by
 def test_no_text_changes_what_the_page_is_made_of(
     bench: tuple[Laboratory, ClaimReport], plain_shape: list[tuple[str, list[str]]], text: str

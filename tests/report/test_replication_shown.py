@@ -76,12 +76,7 @@ def test_a_claim_that_the_papers_own_numbers_would_not_pass_says_so(filled: Labo
     control, unknown = replace(solves, where="control"), replace(solves, outcome=Outcome.ERROR)
     for papers, told in (((solves, wins), True), ((control, wins), False), ((unknown, wins), False), ((), False)):
         page = gather(
-            filled.reproduction,
-            {"full": [solves, wins]},
-            filled.archive,
-            {},
-            sentences={},
-            put_to_the_paper=papers,
+            filled.reproduction, {"full": [solves, wins]}, filled.archive, {}, sentences={}, put_to_the_paper=papers
         )
         first, second = page.sections
         assert any("the paper's own numbers would not pass this assertion" in line for line in first.warnings) is told

@@ -31,11 +31,7 @@ def _reports(where: str, *outcomes: Outcome) -> list[ClaimReport]:
             "1 **not run**. Of 2 cases of controls, which test the benchmark itself, 1 **supported** and 1 **error**.",
         ),
         ((), (), "Of 0 sentences of the paper, none. By case, of 0: none."),
-        (
-            (),
-            (Outcome.SUPPORTED,),
-            "Of 1 case of controls, which test the benchmark itself, 1 **supported**.",
-        ),
+        ((), (Outcome.SUPPORTED,), "Of 1 case of controls, which test the benchmark itself, 1 **supported**."),
     ],
 )
 def test_every_outcome_is_counted_once_and_controls_apart(

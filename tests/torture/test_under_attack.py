@@ -1,6 +1,6 @@
-"""Nothing is lost, repeated or judged otherwise, whatever becomes of processes, machines, clocks and disks.
+"""Nothing is lost, repeated or judged otherwise, whatever becomes of processes and disks.
 
-The attacks in small, but for a crowd; `python tests/torture/run.py` makes them in large.
+Some of the attacks in small; `python tests/torture/run.py` makes all of them in large.
 """
 
 from __future__ import annotations
@@ -10,12 +10,10 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-import clock_jumps
 import full_disk
 import killing
 import pytest
 import stopping_and_continuing
-import two_hosts
 from bench import Laboratory
 from tally import Tally
 
@@ -44,17 +42,6 @@ def test_workers_and_runs_that_are_killed_lose_and_repeat_nothing(laboratory: La
 
 def test_a_process_that_is_stopped_is_waited_for_and_then_taken_over_from(laboratory: Laboratory) -> None:
     assert make(stopping_and_continuing.attack, laboratory, 1).done["batches gone on with"] >= 1
-
-
-def test_a_host_that_dies_is_taken_over_from_by_another(laboratory: Laboratory) -> None:
-    def attack(laboratory: Laboratory, times: int, draw: random.Random) -> Tally:
-        return two_hosts.attack(laboratory, times, draw, trees=False)
-
-    assert make(attack, laboratory, 1).done["batches gone on with"] >= 1
-
-
-def test_a_clock_that_jumps_costs_nothing(laboratory: Laboratory) -> None:
-    assert make(clock_jumps.attack, laboratory, 1).done["jumps"] == 4
 
 
 def test_a_disk_that_fills_up_loses_nothing_and_is_said(laboratory: Laboratory) -> None:

@@ -21,10 +21,7 @@ pytestmark = pytest.mark.oldest
 
 
 def test_a_checkpoint_of_another_platform_is_passed_over(
-    store: Store,
-    cpus: list[Any],
-    uninterrupted: list[TrialResult],
-    monkeypatch: pytest.MonkeyPatch,
+    store: Store, cpus: list[Any], uninterrupted: list[TrialResult], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as patch:
         patch.setattr("evoclaims.trials.result_making.collect", lambda: {**collect(), "machine": "another"})
@@ -136,11 +133,7 @@ def _stop_with_an_old_checkpoint(store: Store, cpus: list[Any], report: int) -> 
 
 
 def test_side_by_side_trials_that_ended_after_the_checkpoint_run_along_so_that_the_widths_stay_the_same(
-    store: Store,
-    tmp_path: Path,
-    cpus: list[Any],
-    side_by_side: list[tuple[int, int]],
-    puts: Counter[int],
+    store: Store, tmp_path: Path, cpus: list[Any], side_by_side: list[tuple[int, int]], puts: Counter[int]
 ) -> None:
     """The bits of a trial depend on the width there, so that it must not depend on when a kill came."""
     wanted = run_climbers(Store(tmp_path / "whole"), cpus)

@@ -160,12 +160,3 @@ def test_a_long_header_is_refused_before_it_is_read(whole: Path, store: Store, m
     memory()
     assert checkpoint.fault(path) == "its header is longer than that of any batch of trials"
     assert memory() < BOUND
-
-
-@pytest.mark.parametrize("make", [Path.mkdir, lambda path: path.symlink_to(path)], ids=["a folder", "a loop of links"])
-def test_what_is_no_file_is_named(make: Callable[[Path], None], whole: Path, store: Store, cpus: list[Any]) -> None:
-    path = store.checkpoints / whole.name
-    path.parent.mkdir(parents=True)
-    make(path)
-    with pytest.raises(DamagedFileError, match=path.name):
-        run(CONDITION, [1, 5], store, cpus)

@@ -86,24 +86,6 @@ def test_a_bad_checkpoint_is_named_and_moved_aside_by_verify(kind: str, interrup
     assert checkpoint.find(store.checkpoints, CONDITION.id, "any") == []
 
 
-def test_after_verify_the_run_works(interrupted: Path, store: Store, cpus: list[Any], digests: list[str]) -> None:
-    path = store.checkpoints / interrupted.name
-    path.parent.mkdir(parents=True)
-    path.write_bytes(interrupted.read_bytes()[:-50])
-    with pytest.raises(DamagedFileError, match=path.name):
-        run(CONDITION, [1, 5], store, cpus)
-    assert store.ids() == ()
-    verify(store, repair=True, checkpoint_fault=fault)
-    assert [result.digest for result in run(CONDITION, [1, 5], store, cpus)] == digests
-
-
-def test_a_whole_checkpoint_has_no_fault(interrupted: Path, store: Store, cpus: list[Any], digests: list[str]) -> None:
-    assert fault(interrupted) is None
-    store.checkpoints.mkdir(parents=True)
-    (store.checkpoints / interrupted.name).write_bytes(interrupted.read_bytes())
-    assert [result.digest for result in run(CONDITION, [1, 5], store, cpus)] == digests
-
-
 def test_a_checkpoint_of_another_program_says_that_it_is_to_be_deleted(
     interrupted: Path, store: Store, cpus: list[Any], digests: list[str]
 ) -> None:

@@ -61,18 +61,6 @@ def test_a_policy_whose_answer_is_bent_is_refused_with_both_names(what: str, tmp
     assert text.endswith("and 'n_parity' takes shape (1,) and type float32.")
 
 
-class Pairing(Answering):
-    """Returns what a policy is made of, and no policy."""
-
-    def best(self, task: Any, state: Any) -> Any:
-        return state, lambda parameters, bits: bits[:1]
-
-
-def test_what_is_no_policy_is_refused_with_both_names() -> None:
-    with pytest.raises(UserError, match=BOTH + r"'best' of 'walker' returns a tuple, not Policy\("):
-        traced_progress(Pairing(), TASK)
-
-
 @pytest.mark.parametrize("task", [TASK, NParity(3, "sampled"), CURRICULUM], ids=["exhaustive", "sampled", "probe"])
 @pytest.mark.parametrize("act", ["examine", "episode", "step"])
 def test_a_bent_answer_is_refused_wherever_a_task_takes_one(task: Any, act: str) -> None:

@@ -53,13 +53,6 @@ def test_a_curriculum_solves_as_many_levels_as_there_were_full_successes(levels:
     assert sorted(reached) == list(reached)
 
 
-def test_a_direct_trial_begins_on_the_last_level_and_leaves_the_others_unsolved() -> None:
-    begun, ended = _ascents(3, "direct", [1.0])
-    assert (begun.level, ended.level) == (2, 2)
-    assert ended.solved_at.tolist() == [NEVER, NEVER, 1]
-    assert ended.finished
-
-
 @pytest.mark.parametrize("success", [float("nan"), 1.0000001, 2.0, -1.0])
 def test_only_a_success_of_exactly_one_solves(success: Any) -> None:
     _, ended = _ascents(2, "curriculum", [success])

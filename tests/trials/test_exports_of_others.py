@@ -81,8 +81,7 @@ TABLE = FRAME.to_csv(index=False)
 
 
 @pytest.mark.parametrize(
-    "before",
-    [MONITOR, "# exported on Monday\n", "# lr,0.1,adam\n#\n\n# second\n", "\n\n", "\ufeff", "#a\r\n"],
+    "before", [MONITOR, "# exported on Monday\n", "# lr,0.1,adam\n#\n\n# second\n", "\n\n", "\ufeff", "#a\r\n"]
 )
 def test_lines_before_the_names_are_passed_over(values: Callable[..., list[float]], before: str) -> None:
     assert values(before + TABLE) == VALUES

@@ -214,10 +214,7 @@ def test_where_the_folder_is_does_not_matter(table: Callable[..., Imported], tmp
         ({"seed": "sed"}, r"There is no column in runs\.csv \(the seeds\) named 'sed'\. Did you mean 'seed'\? Known: "),
         ({"metric": "retrun", "where": SAC}, r"\(a metric\) named 'retrun'\. Did you mean 'return'\?"),
         ({"where": {"alg": "sac"}}, r"named 'alg'\. Did you mean 'algo'\?"),
-        (
-            {"where": {"algo": "sca"}},
-            r"runs\.csv has no row whose algo is 'sca'\. Did you mean 'sac'\? Known: ppo,",
-        ),
+        ({"where": {"algo": "sca"}}, r"runs\.csv has no row whose algo is 'sca'\. Did you mean 'sac'\? Known: ppo,"),
         ({"where": {"algo": "ppo", "lr": 0.001}}, r"runs\.csv has no row with algo 'ppo' and lr 0\.001\."),
         ({}, r"runs\.csv has 2 rows of seed 7 \(rows 2 and 4\), and a row is a trial\. Choose among them by where="),
         (
@@ -237,10 +234,7 @@ def test_where_the_folder_is_does_not_matter(table: Callable[..., Imported], tmp
             r"Seed 7 of runs\.csv reports a last_success of 10\.5\. A success is a share from 0 to 1",
         ),
         ({"metric": {"mean_success": "return"}, "where": {"algo": "ppo"}}, "reports a mean_success of -4"),
-        (
-            {"metric": {"success": "return"}, "where": {"algo": "ppo"}, "step": "length"},
-            "reports a success of -4",
-        ),
+        ({"metric": {"success": "return"}, "where": {"algo": "ppo"}, "step": "length"}, "reports a success of -4"),
     ],
 )
 def test_what_does_not_fit_is_a_sentence_with_the_file_and_what_is_there(

@@ -21,7 +21,6 @@ from evoclaims.trials.store import Store
 pytestmark = pytest.mark.oldest
 
 Make = Callable[..., TrialResult]
-Edit = Callable[..., None]
 
 
 def cut_the_record(store: Store, trial: TrialResult) -> None:
@@ -90,12 +89,6 @@ def test_a_store_that_does_not_exist_yet_has_no_problems(store: Store) -> None:
     assert not store.root.exists()
 
 
-def test_a_root_that_is_a_file_is_a_user_error(tmp_path: Path) -> None:
-    (tmp_path / "store").write_text("not a folder")
-    with pytest.raises(UserError, match="is a file, not a folder"):
-        verify(Store(tmp_path / "store"), repair=False)
-
-
 @pytest.mark.parametrize("damage", [cut_the_record, edit_the_record, cut_the_champion])
 def test_damage_lists_record_and_champion(
     store: Store, trial: TrialResult, damage: Callable[[Store, TrialResult], None]
@@ -105,18 +98,6 @@ def test_damage_lists_record_and_champion(
     assert [problem.path for problem in problems] == [store.record_path(trial.id), store.champion_path(trial.id)]
     assert kinds(problems) == [("record", ".json"), ("champion", ".npz")]
     assert all(problem.moved_to is None for problem in problems)
-
-
-def test_a_lost_champion_lists_its_record(store: Store, trial: TrialResult) -> None:
-    lose_the_champion(store, trial)
-    assert [problem.path for problem in verify(store, repair=False)] == [store.record_path(trial.id)]
-
-
-def test_looking_alone_moves_nothing(store: Store, trial: TrialResult) -> None:
-    cut_the_record(store, trial)
-    before = sorted(store.root.rglob("*"))
-    verify(store, repair=False)
-    assert sorted(store.root.rglob("*")) == before
 
 
 @pytest.mark.parametrize("damage", [cut_the_record, edit_the_record, cut_the_champion, lose_the_champion])
@@ -240,15 +221,3 @@ def test_a_problem_reads_as_one_printable_line(store: Store) -> None:
     problem = Problem(Path("a\x1b[31m\nb"), "record", "it is torn", Path("quarantine/a"))
     assert str(problem).isprintable()
     assert "quarantine" in str(problem)
-
-
-def test_every_trial_of_a_larger_store_is_read_back(
-    store: Store, make_result: Make, parameters: dict[str, Any]
-) -> None:
-    results = [make_result(seed) for seed in range(20)]
-    for result in results:
-        store.put(result, parameters)
-    bad = {results[3].id, results[11].id}
-    for trial_id in bad:
-        store.champion_path(trial_id).write_bytes(b"")
-    assert {problem.path.stem for problem in verify(store, repair=False)} == bad

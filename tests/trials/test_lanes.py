@@ -108,11 +108,7 @@ def _started() -> Any:
 
 @pytest.mark.parametrize("layout", Layout)
 def test_each_size_of_a_share_is_compiled_once_a_device_in_a_run(
-    layout: Layout,
-    tmp_path: Path,
-    cpus: list[Any],
-    monkeypatch: pytest.MonkeyPatch,
-    caplog: pytest.LogCaptureFixture,
+    layout: Layout, tmp_path: Path, cpus: list[Any], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr("evoclaims.trials.lanes.layout_on", lambda platform: layout)
     sizes: Counter[int] = Counter()

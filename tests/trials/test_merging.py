@@ -64,11 +64,6 @@ def test_a_second_merge_copies_nothing(store: Store, other: Store) -> None:
     assert {path: path.stat().st_mtime_ns for path in store.root.rglob("*")} == times
 
 
-def test_a_dry_run_says_the_same_and_writes_nothing(store: Store, other: Store) -> None:
-    assert Counter(one.fate for one in _merge(other, store, dry_run=True)) == {"copied": 3}
-    assert not store.root.exists()
-
-
 def test_of_two_different_records_the_existing_one_stays_and_both_are_named(
     store: Store, other: Store, make_result: Make
 ) -> None:
@@ -137,14 +132,6 @@ def test_a_damaged_file_that_is_there_stays_for_verify_to_move(store: Store, oth
     fates = _merge(other, store)
     assert Counter(one.fate for one in fates) == {"there": 2, "damaged": 1}
     assert record.read_bytes() == b"torn"
-
-
-def test_an_edited_record_is_not_copied(
-    store: Store, other: Store, trial_files: Any, edit_record: Callable[..., None]
-) -> None:
-    record, _ = trial_files(other, 1)
-    edit_record(record, reseal=False, metrics={"mean_success": 1.0})
-    assert Counter(one.fate for one in _merge(other, store)) == {"copied": 2, "damaged": 1}
 
 
 @pytest.fixture

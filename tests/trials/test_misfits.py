@@ -26,8 +26,9 @@ BOTH = "The method 'walker' does not fit the task 'n_parity': "
         (Policy(1.5, lambda _, bits: bits[:1]), "a Policy with 1.5 among its parameters, which are arrays: jnp."),
         (None, "None (without a `return`?), not Policy(parameters, function)."),
         (jnp.zeros(1), "an array, not Policy(parameters, function)."),
+        ((jnp.zeros(1), jnp.tanh), "a tuple, not Policy(parameters, function)."),
     ],
-    ids=["function", "float", "None", "array"],
+    ids=["function", "float", "None", "array", "tuple"],
 )
 def test_a_policy_without_function_or_arrays_is_refused(policy: Any, what: str) -> None:
     method = type("Odd", (Walker,), {"best": lambda self, task, state: policy})()

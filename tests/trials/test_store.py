@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 import os
 import subprocess
 import sys
@@ -51,17 +50,6 @@ def test_what_is_put_is_got(make_result: Make, seed: int, status: str, metrics: 
         back = store.get(result.id)
     assert back is not None
     assert dump(back) == dump(result)
-
-
-@pytest.mark.parametrize("value", [math.inf, -math.inf, math.nan])
-def test_numbers_that_json_lacks_come_back_as_floats(store: Store, make_result: Make, value: float) -> None:
-    result = make_result(metrics={"m": value}, levels={"l": (value,)}, curves={"c": (value,)})
-    store.put(result, {})
-    back = store.get(result.id)
-    assert back is not None
-    for number in (back.metrics["m"], *back.levels["l"], *back.curves["c"]):
-        assert isinstance(number, float)
-        assert repr(number) == repr(value)
 
 
 def test_a_text_that_is_no_number_word_stays_out_of_metrics(store: Store, make_result: Make) -> None:
@@ -150,16 +138,6 @@ def test_another_digest_keeps_the_first_trial_and_its_champion_and_says_so(
     assert store.champion_of(store.get(trial.id)).keys() == parameters.keys()
 
 
-def test_a_trial_run_again_after_a_crash_takes_its_place(
-    store: Store, make_result: Make, parameters: dict[str, Any]
-) -> None:
-    store.put(make_result(status="crashed"), {})
-    assert store.put(make_result(), parameters) == "stored"
-    kept = store.get(make_result().id)
-    assert kept is not None
-    assert kept.status == "done"
-
-
 def test_a_trial_that_diverged_keeps_its_place(store: Store, make_result: Make) -> None:
     store.put(make_result(status="diverged"), {})
     assert store.put(make_result(), {}) == "differs"
@@ -206,17 +184,6 @@ def test_a_champion_is_written_before_its_record(
     monkeypatch.setattr(os, "link", lambda a, b: (placed.append(Path(b).suffix), link(a, b)))
     store.put(make_result(), parameters)
     assert placed == [".npz", ".json"]
-
-
-def test_a_run_killed_between_champion_and_record_is_simply_run_again(
-    store: Store, make_result: Make, parameters: dict[str, Any]
-) -> None:
-    result = make_result()
-    store.put(result, {"bias": np.ones(3)})
-    store.record_path(result.id).unlink()
-    assert store.get(result.id) is None
-    assert store.put(result, parameters) == "stored"
-    assert store.champion_of(store.get(result.id)).keys() == parameters.keys()
 
 
 def test_one_bad_file_costs_no_other_trial(store: Store, make_result: Make) -> None:

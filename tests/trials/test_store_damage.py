@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -102,11 +101,6 @@ def test_a_truncated_file_is_named_with_the_way_out(store: Store, trial: TrialRe
     assert "not one whole JSON text" in complaint(store, trial.id)
 
 
-def test_an_empty_file_is_named_with_the_way_out(store: Store, trial: TrialResult) -> None:
-    store.record_path(trial.id).write_bytes(b"")
-    assert "not one whole JSON text" in complaint(store, trial.id)
-
-
 def test_a_metric_edited_by_hand_breaks_the_seal(store: Store, trial: TrialResult, edit_record: Edit) -> None:
     edit_record(store.record_path(trial.id), reseal=False, metrics={"mean_success": 1.0})
     assert "seal" in complaint(store, trial.id)
@@ -196,22 +190,6 @@ def test_a_record_under_another_trials_name_is_foreign(store: Store, trial: Tria
     assert f"it holds another trial, {trial.id}" in complaint(store, other.id)
 
 
-def test_an_unreadable_file_is_named_with_the_way_out(
-    store: Store, trial: TrialResult, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def refuse(path: Path, *flags: int) -> int:
-        raise PermissionError(13, "Permission denied")
-
-    monkeypatch.setattr(os, "open", refuse)
-    assert "Permission denied" in complaint(store, trial.id)
-
-
-def test_a_folder_in_place_of_a_record_is_named_with_the_way_out(store: Store, trial: TrialResult) -> None:
-    store.record_path(trial.id).unlink()
-    store.record_path(trial.id).mkdir()
-    assert "cannot be read" in complaint(store, trial.id)
-
-
 def test_control_characters_of_a_record_never_reach_the_terminal(
     store: Store, trial: TrialResult, edit_record: Edit
 ) -> None:
@@ -227,21 +205,6 @@ def test_a_swapped_champion_is_refused(store: Store, trial: TrialResult, make_re
     with pytest.raises(DamagedFileError, match="not the champion that the trial's record names") as caught:
         store.champion_of(store.get(trial.id))
     assert caught.value.path == store.champion_path(trial.id)
-
-
-def test_a_champion_with_one_flipped_byte_is_refused(store: Store, trial: TrialResult) -> None:
-    path = store.champion_path(trial.id)
-    data = bytearray(path.read_bytes())
-    data[len(data) // 2] ^= 1
-    path.write_bytes(data)
-    with pytest.raises(DamagedFileError, match="not the champion"):
-        store.champion_of(store.get(trial.id))
-
-
-def test_a_missing_champion_is_refused(store: Store, trial: TrialResult) -> None:
-    store.champion_path(trial.id).unlink()
-    with pytest.raises(DamagedFileError, match="cannot be read"):
-        store.champion_of(store.get(trial.id))
 
 
 @pytest.mark.parametrize("data", [b"", b"PK\x03\x04 and more", b"\x80\x04N.", b"\x93NUMPY"])

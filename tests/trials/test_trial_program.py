@@ -61,9 +61,3 @@ def test_chunks_of_any_length_lead_to_the_same_bits() -> None:
 def test_no_trial_goes_beyond_its_budget() -> None:
     (state,) = _advanced(Layout.ALONE, [1000], steps=5)
     assert np.asarray(state.steps)[~IDLE].tolist() == [5] * 7
-
-
-def test_a_step_that_is_not_healthy_solves_nothing() -> None:
-    (state,) = _advanced(Layout.ALONE, [12], hazard=1.0)
-    assert np.asarray(state.diverged)[~IDLE].all()
-    assert (np.asarray(state.ascent.solved_at) == -1).all()

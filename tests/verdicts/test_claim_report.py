@@ -51,8 +51,7 @@ def test_the_json_is_made_of_built_in_types_alone() -> None:
 
 
 @pytest.mark.parametrize(
-    "torn",
-    [{"outcome": "won"}, {"verdict": {}}, {"attainable": [{"n": 3}]}, {"sources": [{"method": "a"}]}],
+    "torn", [{"outcome": "won"}, {"verdict": {}}, {"attainable": [{"n": 3}]}, {"sources": [{"method": "a"}]}]
 )
 def test_what_is_no_report_is_refused(torn: dict[str, Any]) -> None:
     with pytest.raises(ValueError, match=rf"\$\.{next(iter(torn))}"):

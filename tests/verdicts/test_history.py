@@ -81,11 +81,7 @@ def test_claims_come_in_the_order_in_which_people_count() -> None:
         ("schema = 1", "schema = 2", "its schema is 2 and this version of evoclaims reads schema 1"),
         ("schema = 1", "schema = true", "its schema is True"),
         ("schema = 1", "", "its schema is None"),
-        (
-            'outcome = "refuted"',
-            'outcome = "maybe"',
-            "Invalid enum value 'maybe'",
-        ),
+        ('outcome = "refuted"', 'outcome = "maybe"', "Invalid enum value 'maybe'"),
         ('outcome = "refuted"', "", "beyond the known ones: outcome"),
         ('outcome = "refuted"', 'outcome = "refuted"\nwhy = "so"', "beyond the known ones: why"),
         ("n = 10", "n = true", "n of G1 (smoke) is not as it was written: Expected `int`, got `bool`"),
@@ -93,18 +89,10 @@ def test_claims_come_in_the_order_in_which_people_count() -> None:
         ("p = 1.0", "p = 1.5", "Expected `float` <= 1.0"),
         ("p = 1.0", 'p = "1"', "Expected `float | null`, got `str`"),
         ('reason = "p = 1"', "reason = 1", "Expected `str`, got `int`"),
-        (
-            'accepted = "2025-11-02"',
-            'accepted = "last week"',
-            "Invalid RFC3339 encoded date",
-        ),
+        ('accepted = "2025-11-02"', 'accepted = "last week"', "Invalid RFC3339 encoded date"),
         ('accepted = "2025-11-02"', 'accepted = "2025-13-02"', "accepted of G1 (smoke) is not as it was written"),
         ('environment = "', 'environment = "x', "G1 (smoke) names the environment x"),
-        (
-            'jax = "0.10.2"',
-            "jax = 3",
-            "Expected `str`, got `int`",
-        ),
+        ('jax = "0.10.2"', "jax = 3", "Expected `str`, got `int`"),
         ("[[verdicts.smoke.G1]]", "[verdicts.smoke.G1]", "G1 (smoke) has no list of verdicts"),
         ("[[verdicts.smoke.G1]]", "[[verdicts.smoke]]", "smoke is no table"),
         ("[[verdicts.smoke.G1]]", "[[verdicts]]", "verdicts is no table"),
@@ -134,8 +122,3 @@ def test_a_claim_without_any_verdict_is_said_without_steering_the_terminal() -> 
     with pytest.raises(UserError) as caught:
         parse(b'schema = 1\n[verdicts.smoke]\n"G\\u001b1" = []', "x")
     assert str(caught.value).startswith(r"x holds no accepted verdicts: G\x1b1 (smoke) has no list of verdicts.")
-
-
-def test_a_folder_in_the_files_place_is_said(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match="Cannot read .*: Is a directory"):
-        load(tmp_path)

@@ -123,11 +123,7 @@ def test_the_furthest_place_is_kept_when_the_robot_turns_back() -> None:
 
 @pytest.mark.parametrize(
     ("heights", "tops"),
-    [
-        ("hierarchical", [0.1] * 5 + [0.2] * 5 + [0.3] * 5),
-        ("medium", [0.2] * 15),
-        ("high", [0.3] * 15),
-    ],
+    [("hierarchical", [0.1] * 5 + [0.2] * 5 + [0.3] * 5), ("medium", [0.2] * 15), ("high", [0.3] * 15)],
 )
 def test_obstacles_stand_where_the_paper_puts_them_as_high_as_it_says(heights: Any, tops: list[float]) -> None:
     model = Obstacles(heights=heights).scene.whole

@@ -21,11 +21,7 @@ from evoclaims.envs.ecorobot.stones import SteppingStones
 pytestmark = pytest.mark.slow
 
 ROBOTS, STEPS = 6, 400
-TASKS: dict[str, RobotTask] = {
-    "stones": SteppingStones(),
-    "obstacles": Obstacles(),
-    "ant": SteppingStones(robot=ANT),
-}
+TASKS: dict[str, RobotTask] = {"stones": SteppingStones(), "obstacles": Obstacles(), "ant": SteppingStones(robot=ANT)}
 # Largest difference of an observation: of nearly all steps, and of any. In float32 a foot's contact may begin a
 # rounding error earlier or later, and velocities are up to 10.
 NEARLY_ALL = {"stones": 1e-5, "obstacles": 1e-3, "ant": 1e-3}

@@ -9,7 +9,7 @@ import jax
 import numpy as np
 import pytest
 import reference
-from genomes import at, read_all, same
+from genomes import read_all
 from history import History
 
 from evoclaims.networks.genome import Genome
@@ -70,28 +70,3 @@ def test_rows_through_genomes_as_matrices(network: GraphNetwork, graphs: Any, wa
 
     answers = jax.jit(jax.vmap(answers_of))(graphs)
     np.testing.assert_allclose(answers, wanted, atol=TOLERANCE)
-
-
-def test_genomes_over_rows(network: GraphNetwork, graphs: Any, wanted: Any) -> None:
-    answers = jax.jit(jax.vmap(jax.vmap(network.apply, (0, None)), (None, 0)))(graphs, ROWS)
-    np.testing.assert_allclose(np.swapaxes(answers, 0, 1), wanted, atol=TOLERANCE)
-
-
-def test_each_genome_with_a_row_of_its_own(network: GraphNetwork, graphs: Any, wanted: Any) -> None:
-    """As in an episode of a task with a state."""
-    which = np.arange(len(wanted)) % len(ROWS)
-    answers = jax.jit(jax.vmap(network.apply))(graphs, ROWS[which])
-    np.testing.assert_allclose(answers, wanted[np.arange(len(wanted)), which], atol=TOLERANCE)
-
-
-def test_one_genome_and_one_row(network: GraphNetwork, graphs: Any, wanted: Any) -> None:
-    apply = jax.jit(network.apply)
-    for genome in range(0, len(wanted), 97):
-        for row, answer in zip(ROWS, wanted[genome], strict=True):
-            np.testing.assert_allclose(apply(at(graphs, genome), row), answer, atol=TOLERANCE)
-
-
-def test_the_graph_of_a_genome_does_not_depend_on_its_companions(
-    network: GraphNetwork, genomes: Genome, graphs: Any
-) -> None:
-    assert same(jax.jit(network.express)(at(genomes, 5)), at(graphs, 5))

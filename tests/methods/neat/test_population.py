@@ -24,9 +24,7 @@ INITIAL = Settings(
     connections=12,
     activations=("tanh", "sin", "gauss"),
     mutation=Mutation(
-        bias=Attribute(mean=0.5, std=2.0),
-        response=Attribute(mean=-1.0, std=0.0),
-        weight=Attribute(std=4.0, bound=3.0),
+        bias=Attribute(mean=0.5, std=2.0), response=Attribute(mean=-1.0, std=0.0), weight=Attribute(std=4.0, bound=3.0)
     ),
     species=Species(most=4),
 )
