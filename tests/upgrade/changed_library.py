@@ -35,7 +35,17 @@ CHANGES: Final = (
     Change(
         "evosax", "evosax", "algorithms/distribution_based/cma_es.py", "Params(", "(1.0)", "(1e-6)", "cma_es on parity"
     ),
-    Change("flax", "flax", "version.py", "__version__ = ", "'", "'post-", "cma_es on parity"),
+    Change("brax", "brax", "training/agents/ppo/losses.py", "v_loss = jnp.mean(", "0.5", "0.4", "ppo on parity"),
+    Change("optax", "optax", "_src/alias.py", "\ndef adam(", "= 0.999", "= 0.99", "ppo on parity"),
+    Change(
+        "qdax",
+        "qdax",
+        "core/emitters/mutation_operators.py",
+        "line_noise = ",
+        "* line_sigma",
+        "* line_sigma * 0.5",
+        "map_elites on plane",
+    ),
     Change("mujoco-mjx", "mujoco/mjx", "_src/math.py", "def axis_angle_to_quat(", "* 0.5", "* 0.4", "random on swing"),
 )
 
