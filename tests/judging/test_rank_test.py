@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import PermutationMethod, mannwhitneyu, rankdata
 
-from evoclaims.judging.exact import rank_attainable, rank_test
+from evoclaims.judging.exact import rank_attainable, rank_test, two_sided_rank_p
 
 few_values = st.lists(st.sampled_from([-math.inf, 0.0, 1.0, 2.5, math.inf]), min_size=1, max_size=5)
 
@@ -42,6 +42,7 @@ def test_swapping_sides_turns_the_tail_over(a: list[float], b: list[float]) -> N
     equal = sum(sum(split) == sum(ranks[: len(a)]) for split in combinations(ranks, len(a)))
     both = rank_test(a, b).p + rank_test(b, a).p
     assert both == pytest.approx(1 + equal / math.comb(len(ranks), len(a)), abs=1e-12)
+    assert two_sided_rank_p(a, b) == min(1.0, 2 * rank_test(a, b).p, 2 * rank_test(b, a).p)
 
 
 @given(few_values, few_values, st.randoms(use_true_random=False))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from evoclaims.core.errors import UserError
@@ -39,6 +39,8 @@ class RunMissing:
         any_version: accept a stored trial made with any versions; else one made with versions other than this
             environment's is run again.
         again: seeds run again because of their versions, by the condition's id; filled in as trials are fetched.
+        for_drift: seeds of more trials, by the condition's id, that only the drift check reads; each is made once, with
+            the claims' own (see `more`).
     """
 
     store: Store
@@ -47,6 +49,8 @@ class RunMissing:
     time_limit: float = math.inf
     any_version: bool = False
     again: dict[str, set[int]] = field(default_factory=dict, compare=False)
+    for_drift: Mapping[str, range] = field(default_factory=dict, compare=False)
+    _made: set[str] = field(default_factory=set, init=False, compare=False, repr=False)
 
     def check(self) -> None:
         """Check before the first trial that the store can be written and the device exists.
@@ -68,9 +72,10 @@ class RunMissing:
         chosen, again = devices.choose(self.device), set[int]()
         if not self.any_version:
             again = {seed for seed in seeds if self._is_outdated(TrialSpec(condition, seed))}
+        more = () if condition.id in self._made else self.more(condition, seeds)
         results = run(
             condition,
-            seeds,
+            [*seeds, *more],
             self.store,
             chosen,
             self.watch,
@@ -79,7 +84,20 @@ class RunMissing:
         )
         if again:
             self.again.setdefault(condition.id, set()).update(again)
-        return results
+        if more:
+            self._made.add(condition.id)
+        return [result for result in results if result.seed not in more]
+
+    def more(self, condition: Condition, seeds: Sequence[int]) -> Sequence[int]:
+        """Return the seeds for the drift check that follow on `seeds`, the last that claims read.
+
+        None under a time limit of minutes, which they would use up, and none but on CPUs, where a trial has the same
+        bits in any batch.
+        """
+        more = self.for_drift.get(condition.id, range(0))
+        if not more or more[0] - 1 not in seeds or self.time_limit < 3600:
+            return ()
+        return [seed for seed in more if seed not in seeds] if devices.choose(self.device)[0].platform == "cpu" else ()
 
     def _is_outdated(self, spec: TrialSpec) -> bool:
         """Whether every record of a trial was made with versions other than this environment's."""

@@ -109,13 +109,14 @@ def _works(
 ) -> dict[str, Work]:
     """Look up what is known of conditions of a tier."""
     wanted = {
-        name: Wanted((group.method, group.task), group.condition, seeds) for name, (group, seeds) in groups.items()
+        name: Wanted((group.method, group.task), group.condition, [*seeds, *fetch.more(group.condition, seeds)])
+        for name, (group, seeds) in groups.items()
     }
     store, paper = session.store, session.reproduction
     estimator = Estimator(store, paper, tier, platform, time_limit=fetch.time_limit, any_version=fetch.any_version)
     works = {}
     for name, owed in estimator.owed(wanted).items():
-        (group, seeds), condition = groups[name], wanted[name].condition
+        group, condition, seeds = groups[name][0], wanted[name].condition, wanted[name].seeds
         files = (store.record_path(TrialSpec(condition, seed).id, condition.versions) for seed in owed.seeds)
         missing = tuple(str(path.relative_to(store.root)) for path in files)
         works[name] = Work(group.label, condition.programs, len(seeds) - len(missing), missing, owed.cost)

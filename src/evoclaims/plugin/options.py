@@ -164,8 +164,15 @@ def make_session(config: pytest.Config) -> Session:
     store = Store(_storage(config))
     project = load_config(config.rootpath)
     limit, any_version = project.seconds(config.getoption("claims_time_limit")), config.getoption("claims_any_version")
-    run = RunMissing(store, config.getoption("claims_device"), progress_of(config) or ignore, limit, any_version)
     reproduction = load_reproduction(project)
+    run = RunMissing(
+        store,
+        config.getoption("claims_device"),
+        progress_of(config) or ignore,
+        limit,
+        any_version,
+        for_drift=reproduction.seeds_for_drift,
+    )
     folder = reproduction.references if config.getoption("claims_committed") else None
     read = StoredOnly(Archive(store, folder, reproduction.imported))
     fetch = read if config.getoption("claims_stored") else run

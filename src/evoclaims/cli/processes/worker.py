@@ -100,9 +100,9 @@ def condition_of(project: Project, order: WorkOrder, job: Job) -> Condition:
 
 def run_jobs(project: Project, order: WorkOrder, asked: Iterable[Job], line: LiveLine) -> Iterator[Ended]:
     """Run the missing trials of conditions one after the other; an error in one does not stop the others."""
-    limit = project.config.seconds(order.time_limit)
+    limit, for_drift = project.config.seconds(order.time_limit), project.reproduction.seeds_for_drift
     for job in asked:
-        fetch = RunMissing(project.store, order.device, _named(line, job), limit)
+        fetch = RunMissing(project.store, order.device, _named(line, job), limit, for_drift=for_drift)
         try:
             condition = condition_of(project, order, job)
             with contextlib.closing(line):
