@@ -1,9 +1,10 @@
 """How often one run of smoke finds that a method has drifted, and how often it is wrong, by trials drawn again.
 
-Ten new trials a condition are drawn with replacement from the reference trials and both pilots. Under a shift, trials
-of one method's conditions are drawn with weights exp(shift · z), where z is the normal score of the mean rank of the
-measures: a normal one would move by so many standard deviations. A measure that pilots lack is that of a reference
-trial.
+New trials of each condition, as many as a run makes, and the earlier ones are drawn with replacement from the
+reference trials and both pilots. Under a shift, new trials of one method's conditions are drawn with weights
+exp(shift · z), where z is the normal score of the mean rank of the measures: a normal one would move by so many
+standard deviations. A measure that pilots lack is that of a reference trial. A method that moves is compared at the
+strictest of Holm's levels.
 
     python benchmarks/drift_power.py [SHIFT] [RUNS]
 
@@ -13,6 +14,7 @@ docs/judging.md has the results.
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,12 +23,12 @@ from scipy.stats import norm, rankdata
 
 from evoclaims.claims.power import Pilots, with_test
 from evoclaims.cli.project import open_project
-from evoclaims.judging.drift import LOWER, DriftCase, check_drift, measured
+from evoclaims.judging.drift import ALPHA, LOWER, DriftCase, check_drift, measured
 from evoclaims.judging.e_process import standardized_ranks
 from evoclaims.paper import references
 from evoclaims.trials.result import TrialResult
 
-NEW = 10
+PARTS = ("metrics", "levels", "curves")
 
 
 @dataclass(frozen=True)
@@ -35,28 +37,46 @@ class Drawn:
 
     Attributes:
         method: its name.
+        new: how many trials a run makes.
         reference: trials that have every measure.
         every: these and the pilots'.
-        case: without new trials.
+        case: of the committed trials.
         score: the normal score of each trial, better when higher; None if no measure varies.
     """
 
     method: str
+    new: int
     reference: list[TrialResult]
     every: list[TrialResult]
     case: DriftCase
     score: NDArray[np.float64] | None
 
     def again(self, shift: float, draw: np.random.Generator) -> DriftCase:
-        """Return the case with new trials."""
-        weights = np.ones(len(self.every)) if self.score is None else np.exp(shift * self.score)
-        new = []
-        for number, at in enumerate(draw.choice(len(self.every), NEW, p=weights / weights.sum())):
+        """Return the case with other trials on both sides."""
+        case, weights = self.case, np.ones(len(self.every))
+        moved = weights if self.score is None else np.exp(shift * self.score)
+        return replace(
+            case,
+            new=tuple(replace(one, seed=20_000 + one.seed) for one in self._drawn(self.new, moved, draw)),
+            reference=self._drawn(len(self.reference), weights, draw),
+            pilot=tuple(_like(case.pilot[0], one) for one in self._drawn(len(case.pilot), weights, draw)),
+        )
+
+    def _drawn(self, n: int, weights: NDArray[np.float64], draw: np.random.Generator) -> tuple[TrialResult, ...]:
+        """Return trials with every measure."""
+        found = []
+        for number, at in enumerate(draw.choice(len(self.every), n, p=weights / weights.sum())):
             one, other = self.every[at], self.reference[draw.integers(len(self.reference))]
             whole = one if at < len(self.reference) else other  # a pilot has only what claims read
-            parts = {part: {**getattr(whole, part), **getattr(one, part)} for part in ("metrics", "levels", "curves")}
-            new.append(replace(whole, seed=20_000 + number, status=one.status, digest="", **parts))
-        return replace(self.case, new=tuple(new))
+            parts = {part: {**getattr(whole, part), **getattr(one, part)} for part in PARTS}
+            found.append(replace(whole, seed=number, status=one.status, digest="", **parts))
+        return tuple(found)
+
+
+def _like(pilot: TrialResult, trial: TrialResult) -> TrialResult:
+    """Return a trial with those measures that a pilot has."""
+    parts = {part: {name: getattr(trial, part)[name] for name in getattr(pilot, part)} for part in PARTS}
+    return replace(trial, **parts)
 
 
 def main() -> None:
@@ -64,16 +84,18 @@ def main() -> None:
     shift, runs = (kind(text) for kind, text in zip((float, int), (*sys.argv[1:], "0.8", "20")[:2], strict=True))
     conditions = drawn_from()
     varying = [one.method for one in conditions if one.score is not None]
-    draw = np.random.default_rng(20251127)
+
+    def found(those: Sequence[Drawn], shift: float, alpha: float) -> int:
+        draw = np.random.default_rng([20251127, *those[0].method.encode(), len(those)])  # whatever else is drawn
+        return sum(check_drift([one.again(shift, draw) for one in those], alpha).drifted for _ in range(runs))
+
+    methods = len(check_drift([one.again(0.0, np.random.default_rng(0)) for one in conditions]).detectable)
+    print(f"no shift in {methods} methods: found in {found(conditions, 0.0, ALPHA)} of {runs} runs", flush=True)
     several = {method for method in varying if varying.count(method) > 1}
-    for method in ("", *sorted(several, key=lambda name: (-varying.count(name), name))):
-        reports = [
-            check_drift([one.again(shift * (one.method == method), draw) for one in conditions]) for _ in range(runs)
-        ]
-        named = f"{method} on " if method else ""
-        found = sum(any(row.drifted and row.label.startswith(named) for row in report.rows) for report in reports)
-        what = f"{shift:g} SD in {method}, {varying.count(method)} conditions that vary" if method else "no shift"
-        print(f"{what}: found in {found} of {runs} runs", flush=True)
+    for method in sorted(several, key=lambda name: (-varying.count(name), name)):
+        mine = [one for one in conditions if one.method == method]
+        what = f"{shift:g} SD in {method}, {varying.count(method)} conditions that vary"
+        print(f"{what}: found in {found(mine, shift, ALPHA / methods)} of {runs} runs", flush=True)
 
 
 def drawn_from() -> list[Drawn]:
@@ -81,13 +103,14 @@ def drawn_from() -> list[Drawn]:
     project = open_project(".evoclaims")
     (collected,) = project.collect([("", "smoke")])
     both = [Pilots(project.reproduction, "smoke", with_test(collected), second=second) for second in (False, True)]
-    found = []
+    tier, found = project.reproduction.tier("smoke"), []
     for names, group in sorted(both[0].groups.items()):
         mine = references.of_condition(project.reproduction.references, "smoke", *names, group.condition.id)
         pilot = [trial for those in both if not those.unfit(names) for trial in those.trials[names]]
         reads = both[0].reads(names, mine[0])
         case = references.paired(" on ".join(names), mine, mine, method=names[0], reads=reads, pilot=pilot)
-        found.append(Drawn(names[0], [*mine], [*mine, *pilot], case, _score([*mine, *pilot], case.metrics)))
+        new, every = tier.design.last.n + len(tier.seeds_for_drift(*names)), [*mine, *case.pilot]
+        found.append(Drawn(names[0], new, [*mine], every, case, _score(every, case.metrics)))
     return found
 
 

@@ -13,6 +13,15 @@ from reproductions.nisioti2025.variants import VARIANTS
 TRIALS = 10
 """Trials of each condition in the paper (§5): their power fixes the margin of comparisons."""
 
+MORE = {
+    ("cma_es", "stones"): 90,
+    ("map_elites", "stones"): 60,
+    ("hyperneat", "stones"): 30,
+    ("neat", "stones"): 30,
+    ("ppo", "locomotion_half_cheetah"): 30,
+}
+"""Trials of smoke's conditions for the drift check: ten take one to three seconds (docs/smoke.md)."""
+
 REPRODUCTION = Reproduction(
     name="nisioti2025",
     title="When Does Neuroevolution Outcompete Reinforcement Learning in Transfer Learning Tasks?",
@@ -21,6 +30,7 @@ REPRODUCTION = Reproduction(
         "smoke": Tier(
             conditions={**stepping_gates.SMOKE, **ecorobot.SMOKE, **mechanisms.CONDITIONS},
             design=FIXED_10.for_paper(TRIALS),
+            for_drift=MORE,
         ),
         "full": Tier(
             conditions={**stepping_gates.FULL, **ecorobot.FULL, **mechanisms.CONDITIONS},

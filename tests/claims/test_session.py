@@ -24,7 +24,7 @@ from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction, Variant
 from evoclaims.trials.progress import ignore
 from evoclaims.trials.result import TrialResult
-from evoclaims.trials.spec import Budget, Condition
+from evoclaims.trials.spec import Budget, Condition, TrialSpec
 from evoclaims.trials.store import Store
 from evoclaims.verdicts import history
 from evoclaims.verdicts.history import AcceptedVerdict
@@ -274,6 +274,65 @@ def test_stored_trials_that_were_not_judged_have_no_part_in_the_drift(
     assert statuses(Archive(store)) == {"no drift"}
     references.write(path, [made(better, seed, 1.0, **here) for seed in range(10)])
     assert statuses(Archive(store, session.reproduction.references)) == set()
+
+
+def _with_more(session: Session, more: int) -> Session:
+    """Return a session whose smoke tier makes more trials of "better on small" for the drift check."""
+    tiers = session.reproduction.tiers
+    smoke = replace(tiers["smoke"], for_drift={("better", "small"): more})
+    return replace(session, reproduction=replace(session.reproduction, tiers={**tiers, "smoke": smoke}))
+
+
+def test_trials_for_the_drift_check_are_read_by_no_claim_and_count_when_all_are_there(
+    session: Session, says: Claim, made: Made
+) -> None:
+    session = _with_more(session, 4)
+    better = _pair(session)[0].condition
+    _committed(session, made, lambda seed: seed / 10)
+    place = pilots.path_of(session.reproduction.folder, "smoke", "better", "small", second=False)
+    reads = _pair(session)[0].solves_every_level.in_most_trials().readings()
+    pilots.write(place, [made(better, seed, seed / 100) for seed in range(9, 39)], reads)
+    trials = []
+    for seed in (6, 7, 8, 9):
+        (report,) = _settled(session, made, says, lambda seed: seed / 20)
+        assert (report.n, len(report.sources[0].trials)) == (6, 6)
+        rows = {row.metric: row for row in earlier_trials.drift(session, [report])[0].rows}
+        trials.append((rows["success at level 0"].n_new, rows["success at level 0"].n_ref))
+        session.store.put(made(better, seed, seed / 10), {})
+    rows = {row.metric: row for row in earlier_trials.drift(session, [report])[0].rows}
+    trials.append((rows["success at level 0"].n_new, rows["success at level 0"].n_ref))
+    assert trials == [(6, 40)] * 4 + [(10, 39)]  # the pilot's seed 9 is now a new trial
+
+
+def test_trials_for_the_drift_check_run_once_with_the_last_that_claims_read(tmp_path: Path, session: Session) -> None:
+    session = _with_more(session, 2)
+    condition, more = _pair(session)[0].condition, session.reproduction.seeds_for_drift
+    assert more == {condition.id: range(6, 8)}
+
+    def seeds(**kwargs: Any) -> tuple[list[int], int]:
+        store = Store(tmp_path / str(len(list(tmp_path.iterdir()))))
+        mode = RunMissing(store, "cpu", ignore, for_drift=more, **kwargs)
+        return [trial.seed for trial in mode(condition, range(wanted))], len(store.ids())
+
+    wanted = 6
+    assert seeds() == ([*range(6)], 8)
+    assert seeds(time_limit=60.0) == ([*range(6)], 6)
+    for wanted, there in ((5, 5), (7, 8)):
+        assert seeds() == ([*range(wanted)], there)
+    store = Store(tmp_path / "once")
+    mode = RunMissing(store, "cpu", ignore, for_drift=more)
+    mode(condition, range(6))
+    store.record_path(TrialSpec(condition, 7).id, condition.versions).unlink()
+    assert (len(mode(condition, range(6))), len(store.ids())) == (6, 7)
+
+
+@pytest.mark.parametrize("more", [0, 95])
+def test_a_tier_refuses_trials_for_drift_that_cannot_be_compared(session: Session, more: int) -> None:
+    with pytest.raises(UserError, match=f"for_drift={more} more trials of better on small"):
+        _with_more(session, more)
+    smoke = session.reproduction.tiers["smoke"]
+    with pytest.raises(UserError, match="no method named 'bettr'"):
+        replace(smoke, for_drift={("bettr", "small"): 1})
 
 
 def test_without_reference_trials_nothing_is_said_to_be_unchanged(session: Session, says: Claim, made: Made) -> None:

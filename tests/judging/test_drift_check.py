@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from evoclaims.judging import joint_test
 from evoclaims.judging.drift import DriftCase, check_drift, measured
 
 BEFORE = [0.50, 0.52, 0.54, 0.56, 0.58, 0.60, 0.62, 0.64, 0.66, 0.68]
@@ -115,6 +116,39 @@ def test_the_joint_p_is_that_of_all_permutations(case) -> None:
     assert found == pytest.approx(np.mean(above <= above[0]), abs=0.03)
 
 
+def test_a_condition_with_more_trials_counts_for_more(case, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One has moved, with many trials on both sides; of the other, few trials say nothing."""
+    rng = np.random.default_rng(3)
+    moved = case(rng.normal(0.6, 1, size=40).tolist(), rng.normal(size=100).tolist(), label="a on b", method="a")
+    few = case([0.55, 0.59, 0.63], label="a on c", method="a")
+    weighted = check_drift([moved, few]).rows[0].p_holm
+    monkeypatch.setattr(joint_test.Columns, "seen", 1.0)
+    assert weighted < 0.7 * check_drift([moved, few]).rows[0].p_holm
+
+
+def test_many_permutations_are_made_where_few_do_not_decide(case, monkeypatch: pytest.MonkeyPatch) -> None:
+    made, permuted = [], joint_test._permuted
+    monkeypatch.setattr(joint_test, "_permuted", lambda those, count: made.append(count) or permuted(those, count))
+    for new, counts in (([0.51, 0.55, 0.59, 0.63], [1_999]), ([0.8] * 4, [1_999, 19_999])):
+        made.clear()
+        p_by_two = check_drift([case(new, label=f"a on {n}", method="a") for n in range(2)]).rows[0].p_holm
+        assert made[: len(counts)] == counts
+        assert (p_by_two > 0.1) is (len(counts) == 1)
+
+
+def test_more_seeds_than_the_references_have_prove_nothing_if_those_are_the_same_to_the_bit(trial) -> None:
+    """Trials of the references' seeds with the same bits come from the same code, and so do all others of the run."""
+    old = tuple(trial(seed, value, "c", digest=str(seed)) for seed, value in enumerate(BEFORE))
+    more = tuple(trial(seed, 0.9, "c", digest=str(seed)) for seed in range(10, 20))
+    same = DriftCase("a on b", "c", (*old, *more), old, ("score",))
+    assert [row.detail for row in check_drift([same]).rows] == ["the same trials to the bit"]
+    other = replace(same, new=(replace(old[0], digest="other"), *old[1:], *more))
+    for new in (other.new, more):
+        assert [(row.p is None, row.n_new) for row in check_drift([replace(other, new=new)]).rows] == [
+            (False, len(new))
+        ]
+
+
 def test_levels_and_curves_are_measures_too(trial) -> None:
     one = replace(trial(0, 1.0), levels={"success": (0.25, 0.75)}, curves={"nodes": (1.0, 2.0)})
     assert measured(one, "success at level 1") == 0.75
@@ -202,5 +236,5 @@ def test_a_pilot_counts_for_the_measures_that_it_has(case, trial) -> None:
     )
     rows = {row.metric: row for row in check_drift([both]).rows}
     assert (rows["score"].n_ref, rows["other"].n_ref) == (60, 10)
-    assert rows["other"].p_holm == pytest.approx(2 * min(rows["score"].p, rows["other"].p))
+    assert rows["other"].p_holm == pytest.approx(min(rows["score"].p / 0.8, rows["other"].p / 0.2))
     assert rows["score"].drifted or rows["other"].drifted

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import PermutationMethod, mannwhitneyu, rankdata
 
-from evoclaims.judging.exact import rank_attainable, rank_test
+from evoclaims.judging.exact import rank_attainable, rank_test, two_sided_rank_p
 
 few_values = st.lists(st.sampled_from([-math.inf, 0.0, 1.0, 2.5, math.inf]), min_size=1, max_size=5)
 
@@ -33,6 +33,12 @@ def enumerated(a: list[float], b: list[float]) -> tuple[float, float]:
 def test_the_rank_test_equals_enumeration_of_all_splits(a: list[float], b: list[float]) -> None:
     test = rank_test(a, b)
     assert (test.p, test.attainable_p) == enumerated(a, b)
+
+
+@given(few_values, few_values)
+@settings(deadline=None)
+def test_the_two_sided_p_is_twice_the_smaller_one(a: list[float], b: list[float]) -> None:
+    assert two_sided_rank_p(a, b) == min(1.0, 2 * rank_test(a, b).p, 2 * rank_test(b, a).p)
 
 
 def test_ties_do_not_fool_the_rank_test_as_they_fool_scipys_default() -> None:

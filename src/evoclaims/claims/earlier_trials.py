@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -32,12 +32,16 @@ NAMES: Final = (("method", "name"), ("task", "name"), ("imported", "file"))
 
 @dataclass(frozen=True)
 class _Used:
-    """A condition that a tier's claims use: the ids of its trials, and the seeds that were run again."""
+    """A condition that a tier's claims use: the ids of its trials, and the seeds that were run again.
+
+    `for_drift` are ids of trials that no claim reads. They count if all are there: those that end first are no sample.
+    """
 
     tier: str
     method: str
     task: str
     condition: Condition
+    for_drift: frozenset[str]
     ids: set[str] = field(default_factory=set)
     again: set[int] = field(default_factory=set)
     reads: set[str] = field(default_factory=set)
@@ -53,7 +57,11 @@ def drift(session: Session, reports: Sequence[ClaimReport]) -> tuple[DriftReport
             _reference(session, used),
             method=f"{used.method} ({used.tier})",
             reads=used.reads,
-            pilot=pilots.both(folder, used.tier, used.method, used.task, used.condition.id),
+            pilot=[
+                trial
+                for trial in pilots.both(folder, used.tier, used.method, used.task, used.condition.id)
+                if trial.id not in {new.id for new in trials}
+            ],
         )
         for used in _used(session, reports)
         if (trials := _trials(session, used))
@@ -93,7 +101,8 @@ def _used(session: Session, reports: Sequence[ClaimReport]) -> list[_Used]:
             names = report.tier, source.method, source.task
             if names not in found:
                 tier = session.reproduction.tier(report.tier, session.variant)
-                found[names] = _Used(*names, tier.condition(*names[1:]))
+                condition, more = tier.condition(*names[1:]), tier.seeds_for_drift(*names[1:])
+                found[names] = _Used(*names, condition, frozenset(TrialSpec(condition, seed).id for seed in more))
             found[names].ids.update(source.trials)
             found[names].again.update(source.again)
             found[names].reads.update(source.reads)
@@ -110,10 +119,15 @@ def _reference(session: Session, used: _Used) -> tuple[TrialResult, ...]:
 
 
 def _trials(session: Session, used: _Used) -> list[TrialResult]:
-    """Return the stored trials that a condition's claims were judged from."""
+    """Return the stored trials that a condition's claims were judged from, and those for the drift check alone."""
     get = session.fetch.archive.stored if isinstance(session.fetch, StoredOnly) else session.store.get
-    stored = (get(trial, used.condition.versions) for trial in sorted(used.ids))
-    return [trial for trial in stored if trial is not None]
+
+    def stored(trials: Collection[str]) -> list[TrialResult]:
+        found = (get(trial, used.condition.versions) for trial in sorted(trials))
+        return [trial for trial in found if trial is not None]
+
+    own, more = stored(used.ids), stored(used.for_drift - used.ids)
+    return [*own, *more] if own and len(more) == len(used.for_drift - used.ids) else own
 
 
 def new_histories(

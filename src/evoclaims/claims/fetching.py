@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from evoclaims.core.errors import UserError
@@ -40,6 +40,8 @@ class RunMissing:
             environment's is run again.
         wait: waits until other processes have run the trials that they run ahead.
         again: seeds run again because of their versions, by the condition's id; filled in as trials are fetched.
+        for_drift: seeds of more trials, by the condition's id, that only the drift check reads; each is made once, with
+            the claims' own (see `more`).
     """
 
     store: Store
@@ -49,6 +51,8 @@ class RunMissing:
     any_version: bool = False
     wait: Callable[[Condition, Sequence[int]], None] = lambda condition, seeds: None
     again: dict[str, set[int]] = field(default_factory=dict, compare=False)
+    for_drift: Mapping[str, range] = field(default_factory=dict, compare=False)
+    _made: set[str] = field(default_factory=set, init=False, compare=False, repr=False)
 
     def check(self) -> None:
         """Check before the first trial that the store can be written and the device exists.
@@ -69,16 +73,31 @@ class RunMissing:
         """Return one trial per seed."""
         chosen = devices.choose(self.device)
         self.note_outdated(condition, seeds)
-        self.wait(condition, seeds)
-        return run(
+        more = () if condition.id in self._made else self.more(condition, seeds)
+        self.wait(condition, [*seeds, *more])
+        results = run(
             condition,
-            seeds,
+            [*seeds, *more],
             self.store,
             chosen,
             self.watch,
             time_limit=self.time_limit,
             any_version=self.any_version,
         )
+        if more:
+            self._made.add(condition.id)
+        return [result for result in results if result.seed not in more]
+
+    def more(self, condition: Condition, seeds: Sequence[int]) -> Sequence[int]:
+        """Return the seeds for the drift check that follow on `seeds`, the last that claims read.
+
+        None under a time limit of minutes, which they would use up, and none but on CPUs, where a trial has the same
+        bits in any batch.
+        """
+        more = self.for_drift.get(condition.id, range(0))
+        if not more or more[0] - 1 not in seeds or self.time_limit < 3600:
+            return ()
+        return [seed for seed in more if seed not in seeds] if devices.choose(self.device)[0].platform == "cpu" else ()
 
     def note_outdated(self, condition: Condition, seeds: Sequence[int]) -> None:
         """Note which trials are about to be run again because of their versions."""

@@ -119,13 +119,14 @@ def _works(
 ) -> dict[str, Work]:
     """Look up what is known of conditions of a tier."""
     wanted = {
-        name: Wanted((group.method, group.task), group.condition, seeds) for name, (group, seeds) in groups.items()
+        name: Wanted((group.method, group.task), group.condition, [*seeds, *fetch.more(group.condition, seeds)])
+        for name, (group, seeds) in groups.items()
     }
     store, paper = session.store, session.reproduction
     estimator = Estimator(store, paper, tier, platform, time_limit=fetch.time_limit, any_version=fetch.any_version)
     works = {}
     for name, owed in estimator.owed(wanted).items():
-        (group, seeds), condition = groups[name], wanted[name].condition
+        group, condition, seeds = groups[name][0], wanted[name].condition, wanted[name].seeds
         files = {seed: store.record_path(TrialSpec(condition, seed).id, condition.versions) for seed in owed.seeds}
         missing = {seed: str(path.relative_to(store.root)) for seed, path in files.items()}
         stored, names = len(seeds) - len(missing), (group.method, group.task)

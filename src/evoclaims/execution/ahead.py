@@ -92,7 +92,8 @@ class Ahead:
 
         Args:
             load: the claims and what they lack.
-            seeds: those that are run ahead, by tier: those of its design. A third look's are run when it is due.
+            seeds: those that are run ahead, by tier: those of its design, and with them those for the drift check. A
+                third look's are run when it is due.
         """
         claims = soonest_first(load)
         lacking = (claim for claim in claims if any(load.conditions[name].missing for name in load.claims[claim]))
@@ -139,7 +140,11 @@ class Ahead:
     def _planned(self, load: Workload, tier: str, seeds: Sequence[int], soonest: Sequence[str]) -> TierRun:
         """Return what is to be run of a tier: first what the soonest claim needs, then the longest."""
         works = {name: work for name, work in load.conditions.items() if work.tier == tier}
-        asked = {name: tuple(seed for seed in work.missing if seed in seeds) for name, work in works.items()}
+        more = self.reproduction.seeds_for_drift
+        asked = {
+            name: tuple(seed for seed in work.missing if seed in seeds or seed in more.get(name, ()))
+            for name, work in works.items()
+        }
         jobs = {Job("", *works[name].names, missing): name for name, missing in asked.items() if missing}
         batches = [MissingBatch(job, job.seeds, works[name].cost) for job, name in jobs.items()]
         batches.sort(key=lambda batch: -batch.cost.seconds())

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from evoclaims.core.printable import printable
 from evoclaims.judging.drift_report import DriftReport, DriftRow, DriftStatus
 from evoclaims.judging.effect import a12, median
-from evoclaims.judging.exact import holm, rank_attainable, rank_test
+from evoclaims.judging.exact import holm, rank_attainable, two_sided_rank_p
 from evoclaims.judging.joint_test import Columns, detectable_shift, p_by_blocks, permutations_for, places_of
 from evoclaims.judging.sample import UnreadableTrialError, read_number
 from evoclaims.trials.result import TrialResult
@@ -163,8 +163,9 @@ def _prepared(case: DriftCase) -> tuple[list[Columns], list[DriftRow]]:
     crashed = [trial.seed for trial in (*new, *reference) if trial.status == "crashed"]
     if crashed:
         return [], every("error", f"trials crashed: seeds {', '.join(map(str, crashed))}")
-    before = {trial.seed: trial.digest for trial in reference if trial.digest}
-    if all(trial.digest and before.get(trial.seed) == trial.digest for trial in new):
+    before = {trial.seed: trial.digest for trial in reference}
+    again = [trial for trial in new if trial.seed in before]  # of other seeds there is nothing to compare bits with
+    if again and all(trial.digest and before[trial.seed] == trial.digest for trial in again):
         return [], every("no drift", "the same trials to the bit")
     pilot = [trial for trial in case.pilot if trial.status == "done"]
     known = [metric for metric in case.metrics if pilot and all(_has(trial, metric) for trial in pilot)]
@@ -205,7 +206,7 @@ def _columns(
             without.append(replace(row, status="error", detail=detail))
             continue
         values, stored = _as_exact_as_float32(*sides)
-        p = min(1.0, 2 * min(rank_test(values, stored).p, rank_test(stored, values).p))
+        p = two_sided_rank_p(values, stored)
         found = replace(row, p=p, a12=a12(values, stored), median_new=median(values), median_ref=median(stored))
         ranked = rankdata([*values, *stored])
         ranked = (ranked - ranked.mean()) * (-1 if metric in LOWER else 1)

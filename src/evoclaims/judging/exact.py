@@ -43,10 +43,16 @@ class Counts:
 
     def tail(self, least: int) -> float:
         """Return P(X >= least), for `least` from 0 to `largest`."""
-        # A number's remainder modulo its base minus one is the sum of its digits (here below the base minus one).
-        cases = (self.packed >> (self.width * least)) % ((1 << self.width) - 1)
         # Division of Python integers rounds correctly, so 1 in 20 is the float 0.05 and compares equal to it.
-        return cases / self.total
+        return self._cases(least) / self.total
+
+    def head(self, most: int) -> float:
+        """Return P(X <= most)."""
+        return (self.total - self._cases(most + 1)) / self.total
+
+    def _cases(self, least: int) -> int:
+        # A number's remainder modulo its base minus one is the sum of its digits (here below the base minus one).
+        return (self.packed >> (self.width * least)) % ((1 << self.width) - 1)
 
 
 Alternative = Literal["greater", "less"]
@@ -79,6 +85,18 @@ def rank_test(a: Sequence[float], b: Sequence[float]) -> ExactTest:
     Raises:
         ValueError: when a side is empty or a value is NaN, which cannot be ranked.
     """
+    splits, doubled_u = _split(a, b)
+    return ExactTest(p=splits.tail(doubled_u), attainable_p=splits.tail(splits.largest))
+
+
+def two_sided_rank_p(a: Sequence[float], b: Sequence[float]) -> float:
+    """Return twice the smaller p of A above B and of B above A, at most 1; raises as `rank_test` does."""
+    splits, doubled_u = _split(a, b)
+    return min(1.0, 2 * min(splits.tail(doubled_u), splits.head(doubled_u)))
+
+
+def _split(a: Sequence[float], b: Sequence[float]) -> tuple[Counts, int]:
+    """Count the splits of the pooled values by their 2U, and return that of this split, too."""
     if not len(a) or not len(b):
         raise ValueError("A rank test needs at least one value on each side.")
     if any(map(math.isnan, (*a, *b))):
@@ -91,8 +109,7 @@ def rank_test(a: Sequence[float], b: Sequence[float]) -> ExactTest:
         doubled_u += from_a * (2 * b_below + from_b)
         b_below += from_b
         ties.append(from_a + from_b)
-    splits = _splits_by_doubled_u(len(a), tuple(ties))
-    return ExactTest(p=splits.tail(doubled_u), attainable_p=splits.tail(splits.largest))
+    return _splits_by_doubled_u(len(a), tuple(ties)), doubled_u
 
 
 @lru_cache(maxsize=512)

@@ -16,6 +16,18 @@ from evoclaims.judging.exact import holm
 PERMUTATIONS: Final = 19_999
 """Fewest of a joint test, whose p is at least about 3 / 20,000; of many methods there are more."""
 
+FIRST: Final = 1_999
+"""Permutations that suffice where p turns out to be above `CLEAR`."""
+
+CLEAR: Final = 0.1
+"""A p of `FIRST` permutations above it stands. It stays valid: both p, and that below α, are at most α as often."""
+
+CHUNK: Final = 5_000
+"""Permutations in memory at once."""
+
+IN_PILOTS: Final = 0.8
+"""Share of α for measures that pilots have, where others are tested, too: against ten trials little can be found."""
+
 SEED: Final = 20251126
 """Fixed, so that the same trials always give the same p."""
 
@@ -43,16 +55,30 @@ class Columns:
         variance = (self.centred**2).sum(axis=0) * self.n * (total - self.n) / (total * (total - 1))
         return np.asarray(np.sqrt(np.where(variance > 0, variance, 1.0)))
 
+    @property
+    def seen(self) -> float:
+        """The mean of a standardized rank sum if normal values have moved by one standard deviation.
+
+        Of these, ranks lose 1 - 3/π of the information.
+        """
+        total = len(self.centred)
+        return math.sqrt(3 / math.pi * self.n * (total - self.n) / (total + 1))
+
 
 def permutations_for(families: int, alpha: float) -> int:
     """Return a number of permutations with which p can be half of what Holm's correction and two blocks ask for."""
-    return max(PERMUTATIONS, math.ceil(2 * 3 * 2 * families / alpha))
+    return max(PERMUTATIONS, math.ceil(2 * 3 * families / (alpha * (1 - IN_PILOTS))))
 
 
 def p_by_blocks(conditions: Sequence[Columns], count: int) -> float:
-    """Return the p that nothing changed: the smaller of two, doubled, where some measures alone are in pilots."""
-    blocks = [those for wide in (True, False) if (those := [one for one in conditions if one.wide is wide])]
-    return min(1.0, len(blocks) * min(joint_p(those, count) for those in blocks))
+    """Return the p that nothing changed: of two by their shares of α, where some measures alone are in pilots."""
+    blocks = {wide: those for wide in (True, False) if (those := [one for one in conditions if one.wide is wide])}
+    return min(1.0, min(joint_p(those, count) / _share_of(wide, len(blocks)) for wide, those in blocks.items()))
+
+
+def _share_of(wide: bool, blocks: int) -> float:
+    """Return the share of α that a block of measures has."""
+    return 1.0 if blocks == 1 else IN_PILOTS if wide else 1 - IN_PILOTS
 
 
 def joint_p(conditions: Sequence[Columns], count: int) -> float:
@@ -61,20 +87,28 @@ def joint_p(conditions: Sequence[Columns], count: int) -> float:
     A single measure of a single condition has its exact p. Else new and earlier trials are exchanged at random, whole
     trials within each condition, `count` times with a fixed seed. Three statistics of the measures' rank sums z
     look for three kinds of change: the sum over conditions (all better, or all worse), the sum of squares (anything),
-    and the largest (one alone). Their smallest p is itself compared with its distribution over the permutations, so
-    that p is valid for any dependence of measures.
+    and the largest (one alone). In the sum, a condition counts by the shift that its numbers of trials can show. Their
+    smallest p is itself compared with its distribution over the permutations, so that p is valid for any dependence
+    of measures.
     """
     if len(conditions) == 1 and len(conditions[0].rows) == 1:
         return conditions[0].rows[0].p or 1.0
+    p = _permuted(conditions, FIRST)
+    return p if p > CLEAR else _permuted(conditions, count)
+
+
+def _permuted(conditions: Sequence[Columns], count: int) -> float:
     rng = np.random.default_rng(SEED)
     sums = np.zeros(count + 1)
     squares, largest = np.zeros_like(sums), np.zeros_like(sums)
     for one in conditions:
-        chosen = np.argpartition(rng.random((count, len(one.centred))), one.n, axis=1)[:, : one.n]
-        observed = one.centred[: one.n].sum(axis=0)[None]
-        z = np.concatenate([observed, one.centred[chosen].sum(axis=1)]) / one.spread
+        drawn = [one.centred[: one.n].sum(axis=0)[None]]
+        for begin in range(0, count, CHUNK):
+            keys = rng.random((min(CHUNK, count - begin), len(one.centred)))
+            drawn.append(one.centred[np.argpartition(keys, one.n, axis=1)[:, : one.n]].sum(axis=1))
+        z = np.concatenate(drawn) / one.spread
         together = z.sum(axis=1)
-        sums += together / max(float(together.std()), 1e-12)
+        sums += one.seen * together / max(float(together.std()), 1e-12)
         squares += (z**2).mean(axis=1)
         largest = np.maximum(largest, np.abs(z).max(axis=1))
     statistics = np.round([np.abs(sums), squares, largest], 9)  # equal ones, whatever the order of their sums
@@ -102,13 +136,11 @@ def places_of(conditions: Sequence[Columns], count: int, alpha: float) -> set[tu
 def detectable_shift(conditions: Sequence[Columns], alpha: float) -> float:
     """Return the shift of all measures, in standard deviations, that is found with probability `FOUND`.
 
-    The normal approximation of the sum over conditions, at a third of alpha for each of three statistics; of normal
-    values, a rank sum loses 1 - 3/π of the information.
+    The normal approximation of the sum over conditions, at a third of its α for each of three statistics.
     """
     from scipy.stats import norm  # as in `judging.exact`
 
     sides = {one.wide for one in conditions}
-    conditions = [one for one in conditions if one.wide is max(sides)]
-    z = float(norm.isf(alpha / (2 * 3 * len(sides))) + norm.ppf(FOUND))
-    means = [math.sqrt(3 / math.pi * one.n * (len(one.centred) - one.n) / (len(one.centred) + 1)) for one in conditions]
-    return z * math.sqrt(len(conditions)) / math.fsum(means)
+    share = _share_of(max(sides), len(sides))
+    z = float(norm.isf(alpha * share / (2 * 3)) + norm.ppf(FOUND))
+    return z / math.hypot(*(one.seen for one in conditions if one.wide is max(sides)))

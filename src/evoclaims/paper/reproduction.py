@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Any
 from evoclaims.core.errors import UnknownNameError, UserError, require_known
 from evoclaims.core.tiers import TIERS
 from evoclaims.judging.design import Design
+from evoclaims.judging.exact import MAX_TRIALS
 from evoclaims.paper.reported import FILE, Published, load_published
 from evoclaims.paper.trial_group import TrialGroup
 from evoclaims.trials.imported import Imported
@@ -99,22 +101,38 @@ class Tier:
     Attributes:
         conditions: by method and task, as claims name them: `{("ppo", "n_parity"): Condition(...)}`.
         design: how many trials are judged, with which error rates.
+        for_drift: by method and task, how many more trials a run of claims makes on CPUs, with the seeds after the
+            design's. Only the drift check reads them. They run in the same batch, which compiles nothing for them: of a
+            condition with cheap trials, they show a smaller shift for little time.
         name: such as "smoke"; the reproduction gives it.
         others: what the reproduction's other tiers have, by name; the reproduction gives them, for errors.
     """
 
     conditions: Mapping[tuple[str, str], Condition]
     design: Design
+    for_drift: Mapping[tuple[str, str], int] = field(default_factory=dict, kw_only=True)
     name: str = field(default="", kw_only=True, compare=False, repr=False)
     others: Mapping[str, Collection[Names]] = field(default_factory=dict, kw_only=True, compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Reject a number of trials in the place of the design."""
+        """Reject a number of trials in the place of the design, and trials for drift that nothing could compare."""
         if not isinstance(self.design, Design):
             raise UserError(
                 f"A tier has design={self.design!r}, which is not a Design. Write Tier(conditions, Design.fixed(10)) "
                 "for ten trials."
             )
+        for names, more in self.for_drift.items():
+            self.condition(*names)
+            if not 1 <= more <= MAX_TRIALS - self.design.last.n:
+                raise UserError(
+                    f"A tier has for_drift={more} more trials of {' on '.join(names)}. With the design's "
+                    f"{self.design.last.n} they can be at most {MAX_TRIALS}, and at least one."
+                )
+
+    def seeds_for_drift(self, method: str, task: str) -> range:
+        """Return the seeds of a condition's trials that only the drift check reads (see `for_drift`)."""
+        first = self.design.first_seed + self.design.last.n
+        return range(first, first + self.for_drift.get((method, task), 0))
 
     def condition(self, method: str, task: str) -> Condition:
         """Return the condition of a method on a task; an `UnknownNameError` lists the known ones, or tiers with it."""
@@ -224,6 +242,16 @@ class Reproduction:
         changes = self.changed_by(variant, name)
         tier = self.tiers[name]
         return replace(tier, conditions={**tier.conditions, **changes}) if changes else tier
+
+    @property
+    def seeds_for_drift(self) -> dict[str, range]:
+        """The seeds of trials that only the drift check reads, by the condition's id: of all tiers' (see `Tier`)."""
+        found = {}
+        for tier in self.tiers.values():
+            for names in tier.for_drift:
+                with suppress(UserError):  # it has no id: an error of the claims that ask for it
+                    found[tier.condition(*names).id] = tier.seeds_for_drift(*names)
+        return found
 
     def changed_by(self, variant: str, tier: str) -> Conditions:
         """Return what a variant changes at a tier, nothing without one; an `UnknownNameError` lists the known ones."""

@@ -177,13 +177,16 @@ def make_session(config: pytest.Config) -> Session:
     project = load_config(config.rootpath)
     limit, any_version = project.seconds(config.getoption("claims_time_limit")), config.getoption("claims_any_version")
     reproduction = load_reproduction(project)
-    device, watch = config.getoption("claims_device"), progress_of(config) or ignore
+    device, watch, more = config.getoption("claims_device"), progress_of(config) or ignore, reproduction.seeds_for_drift
     ahead = _ahead(config, reproduction, store, limit)
     if ahead is None:
-        run = RunMissing(store, device, watch, limit, any_version)
+        run = RunMissing(store, device, watch, limit, any_version, for_drift=more)
     else:
         config.stash[AHEAD] = ahead
-        run = RunMissing(store, "cpu" if ahead.host.gpus else device, watch, limit, any_version, ahead.wait)
+        more = {} if ahead.host.gpus else more
+        run = RunMissing(
+            store, "cpu" if ahead.host.gpus else device, watch, limit, any_version, ahead.wait, for_drift=more
+        )
     folder = reproduction.references if config.getoption("claims_committed") else None
     read = StoredOnly(Archive(store, folder, reproduction.imported))
     fetch = read if config.getoption("claims_stored") else run
