@@ -1,9 +1,10 @@
 """How often one run of smoke finds that a method has drifted, and how often it is wrong, by trials drawn again.
 
-New trials of each condition, as many as a run makes, and the earlier ones are drawn with replacement from the reference
-trials and both pilots. Under a shift, new trials of one method's conditions are drawn with weights exp(shift · z), where
-z is the normal score of the mean rank of the measures: a normal one would move by so many standard deviations. A measure
-that pilots lack is that of a reference trial. A method that moves is compared at the strictest of Holm's levels.
+New trials of each condition, as many as a run makes, and the earlier ones are drawn with replacement from the
+reference trials and both pilots. Under a shift, new trials of one method's conditions are drawn with weights
+exp(shift · z), where z is the normal score of the mean rank of the measures: a normal one would move by so many
+standard deviations. A measure that pilots lack is that of a reference trial. A method that moves is compared at the
+strictest of Holm's levels.
 
     python benchmarks/drift_power.py [SHIFT] [RUNS]
 

@@ -14,7 +14,7 @@ TRIALS = 10
 """Trials of each condition in the paper (§5): their power fixes the margin of comparisons."""
 
 MORE = {
-    ("cma_es", "stones"): 70,
+    ("cma_es", "stones"): 90,
     ("map_elites", "stones"): 60,
     ("hyperneat", "stones"): 30,
     ("neat", "stones"): 30,
