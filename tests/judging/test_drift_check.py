@@ -133,7 +133,7 @@ def test_many_permutations_are_made_where_few_do_not_decide(case, monkeypatch: p
     for new, counts in (([0.51, 0.55, 0.59, 0.63], [1_999]), ([0.8] * 4, [1_999, 19_999])):
         made.clear()
         p_by_two = check_drift([case(new, label=f"a on {n}", method="a") for n in range(2)]).rows[0].p_holm
-        assert made[: len(counts)] == counts
+        assert made[:2] == counts
         assert (p_by_two > 0.1) is (len(counts) == 1)
 
 
