@@ -77,11 +77,11 @@ def main(options: argparse.Namespace) -> int:
         platform = "cpu" if options.like == "cpu" else "gpu"
     limit = project.config.seconds(None)
     fetch = RunMissing(store, "cpu", ignore, limit, for_drift=reproduction.seeds_for_drift)
-    wanted = {}
+    wanted: dict[Names, Wanted] = {}
     for names in used:
         condition, seeds = tier.condition(*names), tier.design.seeds(counts[names])
-        drifts = fetch.more(condition, seeds) if platform == "cpu" else ()
-        wanted[names] = Wanted(names, condition, [*seeds, *drifts])
+        for_drift = fetch.more(condition, seeds) if platform == "cpu" else ()
+        wanted[names] = Wanted(names, condition, [*seeds, *for_drift])
     estimator = Estimator(store, reproduction, options.tier, platform, options.like or "", limit)
     owed = estimator.owed(wanted)
     if options.measure:

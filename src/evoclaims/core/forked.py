@@ -24,7 +24,7 @@ def refuse_forked() -> None:
         raise UserError(
             "This process was forked from one in which jax had started, so jax would wait forever. Run "
             "trials in new processes: leave out --forked (pytest-forked) and os.fork(), use "
-            "multiprocessing's start method spawn, or run claims side by side with pytest-xdist (-n 4)."
+            "multiprocessing's start method spawn, or run claims by --claims-processes 4."
         )
 
 

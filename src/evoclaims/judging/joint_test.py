@@ -71,7 +71,7 @@ def permutations_for(families: int, alpha: float) -> int:
 
 
 def p_by_blocks(conditions: Sequence[Columns], count: int) -> float:
-    """Return the p that nothing changed: of two by their shares of α, where some measures alone are in pilots."""
+    """Return the p that nothing changed: the smaller of two by their shares, where only some measures are in pilots."""
     blocks = {wide: those for wide in (True, False) if (those := [one for one in conditions if one.wide is wide])}
     return min(1.0, min(joint_p(those, count) / _share_of(wide, len(blocks)) for wide, those in blocks.items()))
 
