@@ -5,7 +5,6 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Final
 
 from evoclaims.claims.workload import Workload, soonest_first
 from evoclaims.core.errors import UserError
@@ -18,8 +17,6 @@ from evoclaims.trials import devices, gpus
 from evoclaims.trials.batches import StoredTrials
 from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import Store
-
-WHERE: Final = "with --claims-processes 1 pytest shows where"
 
 
 @dataclass(frozen=True)
@@ -122,11 +119,13 @@ class Ahead:
         if self._broken is not None:
             raise self._broken
         error = self._errors.get(condition.id, "")
-        missing = StoredTrials(self.store, condition, self.order.any_version, self.limit).missing(seeds)
-        if missing and not error:
+        stored = StoredTrials(self.store, condition, self.order.any_version, self.limit)
+        if not error and (missing := stored.missing(seeds)):
             error = self._run_now(condition, missing).error
+            if not error and stored.missing(seeds):  # this process must not run them: it may be kept off GPUs
+                error = "its trials were run, and are not in the store"
         if error:
-            raise UserError(f"{error} ({WHERE})")
+            raise UserError(error)
 
     def stop(self) -> None:
         """End all processes; checkpoints let another run go on."""
@@ -184,5 +183,6 @@ class Ahead:
                 if one.id == condition.id:
                     seat = Seat(gpus.only(self.host.gpus) if self.host.gpus else {})
                     workers = Workers(replace(self.order, tier=tier), [seat], lambda text: None, self.warn)
-                    return next(iter(workers.run([[Job("", *names, tuple(seeds))]])))
+                    (ended,) = workers.run([[Job("", *names, tuple(seeds))]])
+                    return ended
         raise UserError(f"{condition.label} is no condition of the paper, so that no process can run it.")
