@@ -8,7 +8,8 @@ import pytest
 
 from evoclaims.judging.drift_report import DigestChange, compare_digests
 
-MADE_BY: dict[str, Any] = {"device": {"kind": "cpu", "count": 1}, "machine": "x86_64", "versions": {"jax": "0.10.2"}}
+CPU = {"platform": "cpu", "kind": "cpu", "count": 1}
+MADE_BY: dict[str, Any] = {"device": CPU, "machine": "x86_64", "versions": {"jax": "0.10.2"}}
 
 
 def test_equal_digests_are_compared_and_unchanged(trial) -> None:
@@ -25,7 +26,8 @@ def test_a_digest_that_differs_is_named_by_its_seed(trial) -> None:
 @pytest.mark.parametrize(
     "other",
     [
-        {"device": {"kind": "NVIDIA H200"}},
+        {"device": CPU | {"kind": "another"}},
+        {"device": CPU | {"platform": "gpu"}},
         {"machine": "arm64"},
         {"versions": {"jax": "0.11.2"}},
         {"device": None},
@@ -37,6 +39,11 @@ def test_another_machine_class_or_version_is_not_comparable(trial, other: dict[s
     theirs = trial(0, 1.0, digest="other", **(MADE_BY | other))
     assert compare_digests([trial(0, 1.0, **MADE_BY)], [theirs]).compared == 0
     assert compare_digests([theirs], [trial(0, 1.0, **MADE_BY)]).compared == 0
+
+
+def test_on_a_gpu_bits_are_not_promised(trial) -> None:
+    made_by = MADE_BY | {"device": CPU | {"platform": "gpu", "kind": "NVIDIA H200"}}
+    assert compare_digests([trial(0, 1.0, **made_by)], [trial(0, 1.0, digest="other", **made_by)]).compared == 0
 
 
 def test_records_that_do_not_say_how_they_were_made_are_never_comparable(trial) -> None:

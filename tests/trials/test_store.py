@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from evoclaims.core.errors import UserError
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.result_codec import dump
-from evoclaims.trials.store import DamagedFileError, Store
+from evoclaims.trials.store import DamagedFileError, Store, gives_way
 from evoclaims.trials.store_files import mark
 
 pytestmark = pytest.mark.oldest
@@ -173,6 +173,19 @@ def test_of_two_ends_of_its_time_the_one_that_had_more_stays(store: Store, make_
         found = store.get(make_result().id)
         assert found is not None
         assert found.timing["limit"] == kept
+
+
+@pytest.mark.parametrize(("first", "second"), [("crashed", "timeout"), ("timeout", "crashed"), ("crashed", "crashed")])
+def test_of_two_failures_the_later_stays_in_whatever_order_they_come(
+    make_result: Make, first: str, second: str
+) -> None:
+    def ended(status: str, when: str) -> TrialResult:
+        made = make_result(status=status)
+        return dataclasses.replace(made, timing={**made.timing, "ended": when}, digest=when)
+
+    early, late = ended(first, "2026-01-01T00:00:00"), ended(second, "2026-01-02T00:00:00")
+    assert gives_way(early, late)
+    assert not gives_way(late, early)
 
 
 def test_a_champion_is_written_before_its_record(

@@ -14,9 +14,8 @@ from evoclaims.cli.store_folder import open_store
 from evoclaims.core.canonical import canonical_json
 from evoclaims.core.errors import UserError
 from evoclaims.core.printable import printable
-from evoclaims.trials.failed import time_allowed
 from evoclaims.trials.result import COMPLETE, TrialResult
-from evoclaims.trials.store import DamagedFileError, Store
+from evoclaims.trials.store import DamagedFileError, Store, gives_way
 
 Fate = Literal["copied", "there", "differs", "damaged"]
 """What became of a file: copied; there already, alike; there and different, so that it stays; left out."""
@@ -60,7 +59,7 @@ def merge_trials(source: Store, into: Store, dry_run: bool = False) -> Iterator[
             continue
         try:
             present = into.present(result)
-            if not (present is None or _gives_way(present, result)):
+            if not (present is None or gives_way(present, result)):
                 yield _compared(path, result, into, present)
             elif dry_run or into.put_packed(result, packed) == "stored":
                 yield Merged(path, "copied")
@@ -68,14 +67,6 @@ def merge_trials(source: Store, into: Store, dry_run: bool = False) -> Iterator[
                 yield _compared(path, result, into, into.present(result))
         except DamagedFileError as error:
             yield Merged(error.path, "damaged", f"it stays as it is, and {path} is left out: {error.reason}")
-
-
-def _gives_way(present: TrialResult, result: TrialResult) -> bool:
-    """Whether a record without an outcome is replaced."""
-    if present.status in COMPLETE:
-        return False
-    longer = present.status == result.status == "timeout" and time_allowed(result) > time_allowed(present)
-    return result.status in COMPLETE or longer
 
 
 def _compared(path: Path, result: TrialResult, into: Store, present: TrialResult | None) -> Merged:

@@ -112,6 +112,22 @@ def what_fixes_bits(provenance: Mapping[str, Any]) -> dict[str, Any]:
     return {name: flags_that_change(value) if name == "xla_flags" else value for name, value in found.items()}
 
 
+def differing(one: Mapping[str, Any], other: Mapping[str, Any]) -> set[str]:
+    """Return which parts that fix bits differ between two provenances; what one lacks, as old ones do, is left out."""
+    ours, theirs = what_fixes_bits(one), what_fixes_bits(other)
+    return {name for name in ours.keys() & theirs.keys() if ours[name] != theirs[name]}
+
+
+def same_bits(one: Mapping[str, Any], other: Mapping[str, Any], but: str = "") -> bool:
+    """Whether one trial should have the same bits by two provenances, but for what the part `but` changes.
+
+    Only CPUs of one class of machine promise it. A provenance without device, machine or versions says too little.
+    """
+    told = all(made.get(part) for made in (one, other) for part in ("device", "machine", "versions"))
+    on_cpu = told and one["device"].get("platform") == other["device"].get("platform") == "cpu"
+    return on_cpu and differing(one, other) <= {but}
+
+
 def git_state() -> dict[str, Any] | None:
     """Return {"sha", "dirty"} of the repository around the current folder, or None when git cannot tell.
 

@@ -6,7 +6,8 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final, Literal
 
-from evoclaims.core.canonical import as_plain, canonical_json
+from evoclaims.core.canonical import as_plain
+from evoclaims.core.provenance import same_bits
 from evoclaims.trials.result import TrialResult
 
 FOUND: Final = 0.95
@@ -165,24 +166,19 @@ class DigestCheck:
 
 
 def compare_digests(new: Sequence[TrialResult], reference: Sequence[TrialResult]) -> DigestCheck:
-    """Compare digests of trials of the same condition, seed, machine class and versions.
-
-    Bit equality is guaranteed on CPU only; a record whose provenance lacks the machine, the device kind or the
-    versions cannot be compared.
-    """
-    stored = {key: trial for trial in reference if (key := _comparable_key(trial)) is not None}
-    pairs = [(trial, stored[key]) for trial in new if (key := _comparable_key(trial)) in stored and key is not None]
+    """Compare digests of trials of the same condition and seed that should have the same bits."""
+    stored: dict[tuple[str, int], list[TrialResult]] = {}
+    for old in reference:
+        stored.setdefault((old.condition, old.seed), []).append(old)
+    pairs = [
+        (trial, old)
+        for trial in new
+        for old in stored.get((trial.condition, trial.seed), ())
+        if same_bits(trial.provenance, old.provenance)
+    ]
     changed = tuple(
         DigestChange(trial.condition, trial.seed, old.digest, trial.digest)
         for trial, old in pairs
         if trial.digest != old.digest
     )
     return DigestCheck(len(pairs), changed)
-
-
-def _comparable_key(trial: TrialResult) -> tuple[str, int, str] | None:
-    """Return what two records must share to be comparable, or None if the record does not have it."""
-    made_by = [trial.device.get("kind"), trial.provenance.get("machine"), trial.provenance.get("versions")]
-    if not all(made_by):
-        return None
-    return trial.condition, trial.seed, canonical_json(made_by)

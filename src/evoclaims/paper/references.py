@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from evoclaims.core.errors import UserError
 from evoclaims.core.files import read_file, write_atomically
 from evoclaims.core.packages import agree, depends_on, differences, recorded
-from evoclaims.core.provenance import what_fixes_bits
 from evoclaims.judging.drift import DriftCase, check_drift
 from evoclaims.judging.drift_report import DigestCheck, DriftReport, compare_digests
 from evoclaims.trials.arrays import unpack
@@ -238,18 +237,7 @@ def _read_alike(one: TrialResult, other: TrialResult) -> bool:
 
 
 def compare(cases: Sequence[DriftCase]) -> tuple[DriftReport, DigestCheck]:
-    """Check all cases for drift, and CPU trials for bit-identical results, which only a CPU guarantees."""
-    checks = [
-        compare_digests([trial], [old for old in case.reference if _bits_should_agree(trial, old)])
-        for case in cases
-        for trial in case.new
-        if trial.device.get("platform") == "cpu" and is_final(trial)
-    ]
+    """Check all cases for drift, and trials that should be equal to the bit for their digests."""
+    checks = [compare_digests(list(filter(is_final, case.new)), case.reference) for case in cases]
     changed = tuple(change for check in checks for change in check.changed)
     return check_drift(cases), DigestCheck(sum(check.compared for check in checks), changed)
-
-
-def _bits_should_agree(one: TrialResult, other: TrialResult) -> bool:
-    """Whether all settings that fix bits, and that both records contain, are equal; old records contain fewer."""
-    ours, theirs = what_fixes_bits(one.provenance), what_fixes_bits(other.provenance)
-    return all(ours[name] == theirs[name] for name in ours.keys() & theirs.keys())

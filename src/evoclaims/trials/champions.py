@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from evoclaims.core.errors import UserError
 from evoclaims.core.keys import EVALUATION, TRAINING, trial_key
-from evoclaims.core.provenance import what_fixes_bits
+from evoclaims.core.provenance import differing
 from evoclaims.envs.base import Episode
 from evoclaims.kernels import kernel_prng
 from evoclaims.methods.base import Policy
@@ -86,11 +86,10 @@ def replay(condition: Condition, result: TrialResult, parameters: Any, devices: 
                 f"The record of {condition.label}, seed {result.seed}, has no {name} for each of the task's "
                 f"{len(values)} levels, so there is nothing to compare a replay with: it is {result.status}."
             )
-    here, there = what_fixes_bits(provenance(devices, condition)), what_fixes_bits(result.provenance)
     return Replay(
         recorded={name: result.levels[name] for name in again},
         again={name: tuple(map(float, values)) for name, values in again.items()},
-        elsewhere=tuple(sorted(name for name in here.keys() & there.keys() if here[name] != there[name])),
+        elsewhere=tuple(sorted(differing(provenance(devices, condition), result.provenance))),
     )
 
 

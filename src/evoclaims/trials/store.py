@@ -26,7 +26,7 @@ from evoclaims.core.files import read_file, write_atomically, write_once
 from evoclaims.core.packages import Versions, agree, depends_on, recorded, without_flags
 from evoclaims.trials.arrays import pack, unpack
 from evoclaims.trials.failed import time_allowed
-from evoclaims.trials.result import TrialResult, matches_digest
+from evoclaims.trials.result import COMPLETE, TrialResult, matches_digest
 from evoclaims.trials.result_codec import RecordError, dump, parse
 from evoclaims.trials.store_files import DEFAULT_ROOT, ELSEWHERE, StoreFiles, check_store, mark, record_id
 
@@ -169,7 +169,7 @@ class Store(StoreFiles):
 
         The champion is written first, so that every existing record is complete. A stored trial of the same versions is
         not replaced, whatever its digest, with one exception: a crash or timeout is not an outcome, so a new run
-        replaces it (see `_gives_way`). If processes put the same trial at the same time, the first record stays and
+        replaces it (see `gives_way`). If processes put the same trial at the same time, the first record stays and
         keeps its own champion: a champion never overwrites another.
 
         Returns:
@@ -190,7 +190,7 @@ class Store(StoreFiles):
         except RecordError as error:  # a bug in the program: found here rather than by the next reader
             raise ValueError(str(error)) from error
         present = self.present(result)
-        if present is not None and not _gives_way(present, result):
+        if present is not None and not gives_way(present, result):
             return "present" if present.digest == result.digest else "differs"
         mark(self.root)
         usual = self.champion_path(sealed.id)
@@ -200,7 +200,7 @@ class Store(StoreFiles):
         if present is None and write_once(path, record, ELSEWHERE):
             return "stored"
         first = self.present(result)
-        if first is not None and (present is None or not _gives_way(first, result)):  # another process was faster
+        if first is not None and (present is None or not gives_way(first, result)):  # another process was faster
             self._remove_champion_beside(first, sealed)
             return self.put_packed(result, packed)
         write_atomically(path, record, ELSEWHERE)
@@ -293,11 +293,13 @@ def _storage_of(path: Path) -> str:
     return "" if root is None or Path(os.path.abspath(root)) in usual else f" --storage {shlex.quote(str(root))}"
 
 
-def _gives_way(present: TrialResult, result: TrialResult) -> bool:
-    """Whether `result` replaces a stored trial without an outcome: it ended otherwise, or had more time."""
-    if present.status == "timeout":
-        return result.status != "timeout" or time_allowed(result) > time_allowed(present)
-    return present.status == "crashed" and present.digest != result.digest
+def gives_way(present: TrialResult, result: TrialResult) -> bool:
+    """Whether `result` replaces a stored trial without an outcome: it has one, more time, or is the later failure."""
+    if present.status in COMPLETE or result.status in COMPLETE:
+        return present.status not in COMPLETE
+    if present.status == result.status == "timeout":
+        return time_allowed(result) > time_allowed(present)
+    return present.digest != result.digest and _ended(result) >= _ended(present)
 
 
 def _versions(result: TrialResult) -> Versions | None:
@@ -308,7 +310,11 @@ def _versions(result: TrialResult) -> Versions | None:
 
 def newest(results: Iterable[TrialResult]) -> TrialResult | None:
     """Return the newest record; None without any. Records without a time count as oldest."""
-    return max(results, key=lambda result: str(result.timing.get("ended", "")), default=None)
+    return max(results, key=_ended, default=None)
+
+
+def _ended(result: TrialResult) -> str:
+    return str(result.timing.get("ended", ""))
 
 
 def _sha256(path: Path) -> str:

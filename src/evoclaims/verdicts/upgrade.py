@@ -8,7 +8,7 @@ from typing import Any
 
 from evoclaims.core.packages import Versions, agree, recorded
 from evoclaims.core.printable import printable
-from evoclaims.core.provenance import what_fixes_bits
+from evoclaims.core.provenance import same_bits
 from evoclaims.judging.drift import DriftCase, check_drift
 from evoclaims.judging.drift_report import DriftReport
 from evoclaims.paper import references
@@ -49,7 +49,7 @@ class Succession:
         """Old and new trials of the same seed that differ only in versions."""
         now = {trial.seed: trial for trial in self.now}
         both = [(old, now[old.seed]) for old in self.before if old.seed in now]
-        return [(old, new) for old, new in both if _same_machine(old, new)]
+        return [(old, new) for old, new in both if same_bits(old.provenance, new.provenance, but="versions")]
 
     @property
     def changed(self) -> int:
@@ -145,11 +145,3 @@ def _line(one: Succession) -> str:
     if not pairs:
         return f"{one.label}: {ran}, none of which can be compared to the bit (another machine or device)"
     return f"{one.label}: {ran}, {one.changed} of {len(pairs)} not the same to the bit as before"
-
-
-def _same_machine(old: TrialResult, new: TrialResult) -> bool:
-    """Whether two trials were made on one class of machine, on a CPU and with the same settings."""
-    if any(trial.device.get("platform") != "cpu" for trial in (old, new)):
-        return False
-    before, now = what_fixes_bits(old.provenance), what_fixes_bits(new.provenance)
-    return all(before[name] == now[name] for name in (before.keys() & now.keys()) - {"versions"})
