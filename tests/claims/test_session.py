@@ -11,14 +11,15 @@ import pytest
 
 from evoclaims.claims import earlier_trials
 from evoclaims.claims.claim import Claim, ClaimTest
-from evoclaims.claims.collected import VerdictFixture
 from evoclaims.claims.fetching import NotStoredError, RunMissing, StoredOnly
 from evoclaims.claims.session import Session
+from evoclaims.claims.verdict_fixture import VerdictFixture
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.packages import without_flags
 from evoclaims.core.provenance import changing_flags
 from evoclaims.judging.design import SEQUENTIAL
 from evoclaims.judging.verdict import Outcome
+from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.paper import pilots, references
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction, Variant
@@ -66,6 +67,24 @@ def test_the_full_tier_judges_the_papers_own_sentence_with_its_own_design(sessio
     report = session.settle(ClaimTest(says, "full", ""), better.mean_success > worse.mean_success)
     assert (report.name, report.n, report.statement) == ("T1", 10, says.says)
     assert [look.n for look in report.attainable] == [10]
+
+
+def test_a_report_names_all_trials_that_were_looked_at_though_copies_count_once(
+    session: Session, says: Claim, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(HandBuilt, "deterministic", False)
+
+    def fetch(condition: Condition, seeds: Sequence[int]) -> Sequence[TrialResult]:
+        trials = session.fetch(condition, seeds)
+        return [replace(one, champion="c" * 64, curves={}) if one.seed < 3 else one for one in trials]
+
+    copying = replace(session, fetch=fetch)
+    better, worse = _pair(copying, "full")
+    report = copying.settle(ClaimTest(says, "full", ""), better.mean_success > worse.mean_success)
+    assert "(seeds 0, 1, 2)" in report.reason
+    assert "n = 8 instead of 10" in report.reason
+    assert report.n == 10
+    assert report.sources[0].trials == tuple(TrialSpec(better.condition, seed).id for seed in range(10))
 
 
 def test_a_fixed_number_of_trials_takes_the_place_of_the_looks(session: Session, says: Claim) -> None:
