@@ -103,7 +103,7 @@ def test_a_checkpoint_of_another_program_says_that_it_is_to_be_deleted(
 def test_a_checkpoint_of_a_later_format_is_passed_over_and_reported(interrupted: Path, store: Store) -> None:
     path = store.checkpoints / interrupted.name
     path.parent.mkdir(parents=True)
-    path.write_bytes(_reheaded(interrupted.read_bytes(), schema=2, chunks="two"))
+    path.write_bytes(_reheaded(interrupted.read_bytes(), schema=2, chunks="two", widths=[4]))
     assert checkpoint.find(store.checkpoints, CONDITION.id, "any") == []
     assert fault(path) == "it has schema 2, not 1"
 

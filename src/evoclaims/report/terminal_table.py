@@ -69,7 +69,7 @@ def verdict_table(reports: Sequence[ClaimReport], width: int, colour: bool, enco
     folders = sorted({os.path.relpath(Path(report.evidence).parent) for report in reports if report.evidence})
     captions = [f"evidence: {printable(folder)}/<claim>.json" for folder in folders]
     if any(report.as_expected for report in reports):
-        captions.append("* examined and accepted (expect= in the claim)")
+        captions.append("* examined and accepted (expect= or @expected in the claim)")
     if any(report.tried is Tried.INSENSITIVE for report in reports):
         captions.append("insensitive: no fault planted in the claim's methods changes its verdict, so it is no support")
     if any(report.is_vacuous for report in reports):

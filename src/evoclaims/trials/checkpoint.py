@@ -119,9 +119,13 @@ def _header(path: Path) -> Header | None:
     """Return a checkpoint's header, or None when the file is gone or of another release; its state is not read."""
     try:
         with _opened(path) as (header, _):
-            return header if header.schema == SCHEMA else None
-    except FileNotFoundError:
+            return header
+    except (FileNotFoundError, _OtherSchemaError):
         return None
+
+
+class _OtherSchemaError(Exception):
+    """A checkpoint is of another release."""
 
 
 @contextlib.contextmanager
@@ -131,20 +135,22 @@ def _opened(path: Path) -> Iterator[tuple[Header, Packed]]:
     Raises:
         DamagedFileError: when the file is torn, edited, misplaced or no checkpoint, also if that is found in the block.
         FileNotFoundError: when the file is gone.
+        _OtherSchemaError: when another release has written it.
     """
     try:
         with open_file(path) as file:
             packed = Packed(file)
             if packed.nbytes(_HEADER) > _HEADER_BYTES:
                 raise DamagedFileError(path, "its header is longer than that of any batch of trials")
-            header = Header(**json.loads(packed[_HEADER].tobytes()))
-            if header.schema == SCHEMA:
-                header = convert(vars(header), Header)
-                known = all(seed in header.batch for seed in header.seeds)  # as the runner relies on
-                if not (known and is_hash(header.condition) and header.curves.keys() == set(map(str, header.batch))):
-                    raise DamagedFileError(path, "its header does not describe a batch of trials")
-                if path.name != path_of(path.parent, header).name:
-                    raise DamagedFileError(path, "its name is not that of the batch it holds")
+            told = json.loads(packed[_HEADER].tobytes())
+            if told.get("schema", SCHEMA) != SCHEMA:
+                raise _OtherSchemaError(f"it has schema {told['schema']}, not {SCHEMA}")
+            header = convert(vars(Header(**told)), Header)
+            known = all(seed in header.batch for seed in header.seeds)  # as the runner relies on
+            if not (known and is_hash(header.condition) and header.curves.keys() == set(map(str, header.batch))):
+                raise DamagedFileError(path, "its header does not describe a batch of trials")
+            if path.name != path_of(path.parent, header).name:
+                raise DamagedFileError(path, "its name is not that of the batch it holds")
             yield header, packed
     except FileNotFoundError:
         raise
@@ -176,7 +182,7 @@ def restore(folder: Path, header: Header, like: Any) -> TrialState | None:
                 )
             state: TrialState = jax.tree.unflatten(structure, [packed[name] for name in names])
             return state
-    except FileNotFoundError:
+    except (FileNotFoundError, _OtherSchemaError):
         return None
 
 
@@ -189,11 +195,11 @@ def remove(folder: Path, header: Header) -> None:
 def fault(path: Path) -> str | None:
     """Return why a checkpoint cannot be resumed, or None when it can (or is gone)."""
     try:
-        with _opened(path) as (header, packed):
-            if not packed.is_whole():
-                return "it is not a readable checkpoint"
+        with _opened(path) as (_, packed):
+            return None if packed.is_whole() else "it is not a readable checkpoint"
     except FileNotFoundError:
         return None
+    except _OtherSchemaError as error:
+        return str(error)
     except DamagedFileError as error:
         return error.reason
-    return None if header.schema == SCHEMA else f"it has schema {header.schema}, not {SCHEMA}"

@@ -1,4 +1,4 @@
-"""The three programs of a condition (start, advance, score), written for one trial."""
+"""The three programs of a condition (start, advance, examine), written for one trial."""
 
 from __future__ import annotations
 
