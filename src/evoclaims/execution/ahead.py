@@ -94,7 +94,7 @@ class Ahead:
         """
         claims = soonest_first(load)
         lacking = (claim for claim in claims if any(load.conditions[name].missing for name in load.claims[claim]))
-        soonest = load.claims[next(lacking, "")] if load.claims else ()
+        soonest = load.claims.get(next(lacking, ""), ())
         runs, ends = list[TierRun](), dict[str, float]()
         for tier in seeds:
             run = self._planned(load, tier, seeds[tier], soonest)
