@@ -14,14 +14,21 @@ from evoclaims.claims.claim import Claim, ClaimTest
 from evoclaims.claims.collected import VerdictFixture
 from evoclaims.claims.fetching import NotStoredError, RunMissing, StoredOnly
 from evoclaims.claims.session import Session
+from evoclaims.claims.workload import Work, Workload
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.packages import without_flags
 from evoclaims.core.provenance import changing_flags
+from evoclaims.execution.ahead import Ahead
+from evoclaims.execution.host import Host
+from evoclaims.execution.job import Job, missing_batches
+from evoclaims.execution.worker import WorkOrder
 from evoclaims.judging.design import SEQUENTIAL
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper import pilots, references
 from evoclaims.paper.archive import Archive
+from evoclaims.paper.cost import Cost
 from evoclaims.paper.reproduction import Reproduction, Variant
+from evoclaims.trials.layout import Layout
 from evoclaims.trials.progress import ignore
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Budget, Condition, TrialSpec
@@ -324,6 +331,79 @@ def test_trials_for_the_drift_check_run_once_with_the_last_that_claims_read(tmp_
     mode(condition, range(6))
     store.record_path(TrialSpec(condition, 7).id, condition.versions).unlink()
     assert (len(mode(condition, range(6))), len(store.ids())) == (6, 7)
+
+
+def test_trials_for_the_drift_check_count_where_they_ended_and_have_the_versions_of_the_others(
+    session: Session, says: Claim, made: Made
+) -> None:
+    """A run that makes none of them, as on a GPU or after an upgrade under a short limit, finds older ones."""
+    session = _with_more(session, 2)
+    better = _pair(session)[0].condition
+    _committed(session, made, lambda seed: seed / 10)
+    reports = _settled(session, made, says, lambda seed: seed / 10)
+
+    def counted(**kwargs: Any) -> int:
+        for seed in (6, 7):
+            for path in session.store.record_files(TrialSpec(better, seed).id):
+                path.unlink(missing_ok=True)
+            session.store.put(made(better, seed, seed / 10, **(kwargs if seed == 7 else {})), {})
+        return int(earlier_trials.drift(session, reports)[0].rows[0].n_new)
+
+    assert counted() == 8
+    assert counted(versions={"jax": "0.0"}) == 6
+    assert counted(status="timeout") == 6
+
+
+def test_a_claim_whose_trials_are_there_is_judged_where_those_for_the_drift_check_cannot_be_made(
+    tmp_path: Path, session: Session
+) -> None:
+    session = _with_more(session, 2)
+    condition, more = _pair(session)[0].condition, session.reproduction.seeds_for_drift
+    store = Store(tmp_path / "damaged")
+    assert len(RunMissing(store, "cpu", ignore, for_drift=more)(condition, range(6))) == 6
+    for seed, whole in ((7, True), (5, False)):
+        store.record_path(TrialSpec(condition, seed).id, condition.versions).write_text("{")
+        ahead = Ahead(Host(2, ()), WorkOrder(str(store.root), "", "cpu", 0, 0), session.reproduction, store, 1e9, print)
+        ahead._errors[condition.id] = "the store is damaged"
+        for mode in (RunMissing(store, "cpu", ignore, wait=wait, for_drift=more) for wait in (_no_wait, ahead.wait)):
+            if whole:
+                assert [trial.seed for trial in mode(condition, range(6))] == [*range(6)]
+            else:
+                with pytest.raises(UserError, match=r"it is not one whole JSON text|the store is damaged"):
+                    mode(condition, range(6))
+
+
+def _no_wait(condition: Condition, seeds: Sequence[int]) -> None:
+    pass
+
+
+def test_trials_for_the_drift_check_are_asked_of_processes_on_cpus_alone(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a condition whose claim may come to a third look of twelve trials."""
+    session = _with_more(session, 4)
+    condition, paper = _pair(session)[0].condition, session.reproduction
+    job = Job("", "better", "small")
+
+    def batch(platform: str, limit: float) -> tuple[int, ...]:
+        (one,) = missing_batches(session.store, paper, "smoke", {job: condition}, range(6), limit, platform)
+        return one.seeds
+
+    def ahead(gpus: tuple[str, ...], limit: float) -> tuple[int, ...]:
+        asked: list[Job] = []
+        monkeypatch.setattr(
+            Ahead, "_run", lambda self, runs: asked.extend(job for run in runs for job in run.conditions)
+        )
+        cost = Cost(1.0, 1.0, 12, Layout.ALONE)
+        works = {condition.id: Work(job.names, "smoke", "", 0, dict.fromkeys(range(12), ""), cost)}
+        one = Ahead(Host(2, gpus), WorkOrder("", "", "cpu", 0, 0), paper, session.store, limit, print)
+        one.start(Workload("", {"claim": (condition.id,)}, works), {"smoke": range(6)})
+        one.stop()
+        return asked[0].seeds
+
+    assert batch("cpu", 1e9) == ahead((), 1e9) == (*range(10),)
+    assert batch("gpu", 1e9) == ahead(("0", "1"), 1e9) == (*range(6),)
+    assert batch("cpu", 60.0) == ahead((), 60.0) == (*range(6),)
 
 
 @pytest.mark.parametrize("more", [0, 95])

@@ -6,6 +6,7 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from evoclaims.claims.fetching import more_for_drift
 from evoclaims.claims.workload import Workload, soonest_first
 from evoclaims.core.errors import UserError
 from evoclaims.execution.host import Host
@@ -118,12 +119,17 @@ class Ahead:
             self._ended[condition.id].wait()
         if self._broken is not None:
             raise self._broken
-        error = self._errors.get(condition.id, "")
         stored = StoredTrials(self.store, condition, self.order.any_version, self.limit)
-        if not error and (missing := stored.missing(seeds)):
+        if not (missing := stored.missing(seeds)):
+            return
+        error = self._errors.get(condition.id, "")
+        if not error:
             error = self._run_now(condition, missing).error
             if not error and stored.missing(seeds):  # this process must not run them: it may be kept off GPUs
-                error = "its trials were run, and are not in the store"
+                error = (
+                    "worker processes have run other trials than the claim needs: the project was edited after this "
+                    "run had begun, or its settings differ from process to process; run it again"
+                )
         if error:
             raise UserError(error)
 
@@ -139,11 +145,9 @@ class Ahead:
     def _planned(self, load: Workload, tier: str, seeds: Sequence[int], soonest: Sequence[str]) -> TierRun:
         """Return what is to be run of a tier: first what the soonest claim needs, then the longest."""
         works = {name: work for name, work in load.conditions.items() if work.tier == tier}
-        more = self.reproduction.seeds_for_drift
-        asked = {
-            name: tuple(seed for seed in work.missing if seed in seeds or seed in more.get(name, ()))
-            for name, work in works.items()
-        }
+        known, platform = self.reproduction.seeds_for_drift, self.platform
+        due = {name: {*seeds, *more_for_drift(known, name, seeds, self.limit, platform)} for name in works}
+        asked = {name: tuple(seed for seed in work.missing if seed in due[name]) for name, work in works.items()}
         jobs = {Job("", *works[name].names, missing): name for name, missing in asked.items() if missing}
         batches = [MissingBatch(job, job.seeds, works[name].cost) for job, name in jobs.items()]
         batches.sort(key=lambda batch: -batch.cost.seconds())
