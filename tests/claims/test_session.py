@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,8 @@ from evoclaims.core.provenance import changing_flags
 from evoclaims.execution.ahead import Ahead
 from evoclaims.execution.host import Host
 from evoclaims.execution.job import Job, missing_batches
-from evoclaims.execution.worker import WorkOrder
+from evoclaims.execution.worker import Ended, WorkOrder
+from evoclaims.execution.workers import Workers
 from evoclaims.judging.design import SEQUENTIAL
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper import pilots, references
@@ -30,13 +31,15 @@ from evoclaims.paper.cost import Cost
 from evoclaims.paper.reproduction import Reproduction, Variant
 from evoclaims.trials.layout import Layout
 from evoclaims.trials.progress import ignore
-from evoclaims.trials.result import TrialResult
+from evoclaims.trials.result import Status, TrialResult
 from evoclaims.trials.spec import Budget, Condition, TrialSpec
 from evoclaims.trials.store import Store
 from evoclaims.verdicts import history
 from evoclaims.verdicts.history import AcceptedVerdict
 
 Made = Callable[..., TrialResult]
+
+COST = Cost(1.0, 1.0, 12, Layout.ALONE)
 
 
 def _value(condition: Condition, seed: int) -> float:
@@ -394,8 +397,7 @@ def test_trials_for_the_drift_check_are_asked_of_processes_on_cpus_alone(
         monkeypatch.setattr(
             Ahead, "_run", lambda self, runs: asked.extend(job for run in runs for job in run.conditions)
         )
-        cost = Cost(1.0, 1.0, 12, Layout.ALONE)
-        works = {condition.id: Work(job.names, "smoke", "", 0, dict.fromkeys(range(12), ""), cost)}
+        works = {condition.id: Work(job.names, "smoke", "", 0, dict.fromkeys(range(12), ""), COST)}
         one = Ahead(Host(2, gpus), WorkOrder("", "", "cpu", 0, 0), paper, session.store, limit, print)
         one.start(Workload("", {"claim": (condition.id,)}, works), {"smoke": range(6)})
         one.stop()
@@ -404,6 +406,35 @@ def test_trials_for_the_drift_check_are_asked_of_processes_on_cpus_alone(
     assert batch("cpu", 1e9) == ahead((), 1e9) == (*range(10),)
     assert batch("gpu", 1e9) == ahead(("0", "1"), 1e9) == (*range(6),)
     assert batch("cpu", 60.0) == ahead((), 60.0) == (*range(6),)
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_a_trial_that_crashes_in_a_worker_is_run_once_and_its_claim_says_so(
+    session: Session, says: Claim, made: Made, monkeypatch: pytest.MonkeyPatch, known: bool
+) -> None:
+    """Whether it is known beforehand that the claim needs it, or not."""
+    better, ran = _pair(session)[0], list[tuple[int, ...]]()
+    here = {"versions": without_flags(better.condition.versions), "xla_flags": changing_flags()}
+
+    def run(workers: Workers, groups: Sequence[Sequence[Job]]) -> Iterator[Ended]:
+        for job in groups[0]:
+            ran.append(job.seeds)
+            for seed in job.seeds:
+                status: Status = "crashed" if seed == 3 else "done"
+                session.store.put(made(better.condition, seed, 1.0, status, **here), {})
+            yield Ended(job)
+
+    monkeypatch.setattr(Workers, "run", run)
+    order = WorkOrder(str(session.store.root), "", "cpu", 0, 0)
+    ahead = Ahead(Host(2, ()), order, session.reproduction, session.store, 1e9, print)
+    works = {better.condition.id: Work(("better", "small"), "smoke", "", 0, dict.fromkeys(range(6), ""), COST)}
+    ahead.start(Workload("", {"claim": tuple(works)} if known else {}, works if known else {}), {"smoke": range(6)})
+    running = replace(session, fetch=RunMissing(session.store, "cpu", ignore, wait=ahead.wait))
+    for _ in range(2):
+        better = _pair(running)[0]
+        report = running.settle(ClaimTest(says, "smoke", ""), better.solves_every_level.in_most_trials())
+        assert (report.outcome, ran) == ("error", [(*range(6),)])
+        assert "1 of 6 trials of better on small crashed (seed 3)" in report.reason
 
 
 @pytest.mark.parametrize("more", [0, 95])

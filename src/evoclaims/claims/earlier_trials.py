@@ -16,7 +16,7 @@ from evoclaims.core.packages import agree, recorded
 from evoclaims.judging.drift import changed_settings
 from evoclaims.judging.drift_report import DigestCheck, DriftReport
 from evoclaims.paper import pilots, references
-from evoclaims.trials.result import COMPLETE, TrialResult
+from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import DamagedFileError
 from evoclaims.verdicts.claim_report import ClaimReport
@@ -132,7 +132,7 @@ def _trials(session: Session, used: _Used) -> list[TrialResult]:
     alike = [
         trial
         for trial in stored(more)  # a run that does not make them may find those of other versions
-        if trial.status in COMPLETE and recorded(trial.provenance, packages) in versions
+        if trial.status != "timeout" and recorded(trial.provenance, packages) in versions
     ]
     return [*own, *alike] if own and len(alike) == len(more) else own
 

@@ -16,6 +16,7 @@ from evoclaims.execution.workers import Seat, StoppedError, Workers, in_queue, s
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.trials import devices, gpus
 from evoclaims.trials.batches import StoredTrials
+from evoclaims.trials.failed import remember
 from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import Store
 
@@ -163,7 +164,8 @@ class Ahead:
         try:
             for run in runs:
                 for ended in self._started(run.order, run.seats).run(run.groups):
-                    name = run.conditions[ended.job]
+                    name, tier = run.conditions[ended.job], self.reproduction.tier(run.order.tier, self.order.variant)
+                    self._note_crashes(tier.condition(*ended.job.names), ended.job.seeds)
                     self._errors[name] = ended.error
                     self._ended[name].set()
         except StoppedError:
@@ -172,6 +174,12 @@ class Ahead:
             self._broken = error
         for event in self._ended.values():
             event.set()
+
+    def _note_crashes(self, condition: Condition, seeds: Sequence[int]) -> None:
+        """Take trials that have crashed in a worker for this run's own: it does not begin them again."""
+        for result in StoredTrials(self.store, condition, self.order.any_version, self.limit).sound(seeds):
+            if result.status == "crashed":
+                remember(result)
 
     def _started(self, order: WorkOrder, seats: Sequence[Seat]) -> Workers:
         with self._lock:
@@ -188,5 +196,6 @@ class Ahead:
                     seat = Seat(gpus.only(self.host.gpus) if self.host.gpus else {})
                     workers = Workers(replace(self.order, tier=tier), [seat], lambda text: None, self.warn)
                     (ended,) = workers.run([[Job("", *names, tuple(seeds))]])
+                    self._note_crashes(one, seeds)
                     return ended
         raise UserError(f"{condition.label} is no condition of the paper, so that no process can run it.")
