@@ -16,7 +16,7 @@ import pytest
 from tiny_project import REPRODUCTION, Evoclaims, Project
 
 from evoclaims.execution.job import Job
-from evoclaims.execution.worker import WorkOrder
+from evoclaims.execution.worker import Ended, WorkOrder
 from evoclaims.execution.workers import Process
 
 SLOW = """
@@ -90,3 +90,26 @@ def test_what_a_process_says_that_cannot_open_the_project_is_why_it_ended(
             full.close()
     assert process.why().startswith("The module 'tiny_paper', which [tool.evoclaims] names, does not import: Runtime")
     assert "on strike" in process.why()
+
+
+READER = """    def init(self, key, task):
+        import subprocess
+        assert subprocess.run(["cat"], stdout=subprocess.PIPE, check=True).stdout == b""
+        return jnp.where"""
+
+
+def test_a_method_that_reads_its_input_takes_no_condition_from_the_worker(project: Project) -> None:
+    """Programs that it starts may, such as ffmpeg; they would wait for ever."""
+    paper = project.path / "tiny_paper.py"
+    begun = "    def init(self, key, task):\n        return jnp.where"
+    assert begun in paper.read_text()
+    paper.write_text(paper.read_text().replace(begun, READER))
+    process = Process(WorkOrder(".evoclaims", "smoke", "cpu", 0, 1), {})
+    watchdog = threading.Timer(60.0, process.stop)
+    watchdog.start()
+    assert process.is_ready()
+    for method in ("coin", "right"):
+        job = Job("", method, "parity")
+        assert process.run(job, lambda text: None) == Ended(job)
+    watchdog.cancel()
+    process.close()
