@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -406,6 +407,35 @@ def test_trials_for_the_drift_check_are_asked_of_processes_on_cpus_alone(
     assert batch("cpu", 1e9) == ahead((), 1e9) == (*range(10),)
     assert batch("gpu", 1e9) == ahead(("0", "1"), 1e9) == (*range(6),)
     assert batch("cpu", 60.0) == ahead((), 60.0) == (*range(6),)
+
+
+@pytest.mark.parametrize(("gpus", "first"), [(("0", "1"), "ahead"), ((), "due now")])
+def test_what_was_not_asked_for_beforehand_waits_for_gpus(
+    session: Session, made: Made, monkeypatch: pytest.MonkeyPatch, gpus: tuple[str, ...], first: str
+) -> None:
+    better, worse = (group.condition for group in _pair(session))
+    here = {"versions": without_flags(worse.versions), "xla_flags": changing_flags()}
+    log, judged = list[str](), threading.Event()
+
+    def run_ahead(ahead: Ahead, runs: object) -> None:
+        judged.wait(0.3 if gpus else 60.0)
+        log.append("ahead")
+
+    def run(workers: Workers, groups: Sequence[Sequence[Job]]) -> Iterator[Ended]:
+        log.append("due now")
+        session.store.put(made(worse, 0, 1.0, **here), {})
+        yield Ended(groups[0][0])
+
+    monkeypatch.setattr(Ahead, "_run", run_ahead)
+    monkeypatch.setattr(Workers, "run", run)
+    order = WorkOrder(str(session.store.root), "", "cpu", 0, 0)
+    ahead = Ahead(Host(2, gpus), order, session.reproduction, session.store, 1e9, print)
+    works = {better.id: Work(("better", "small"), "smoke", "", 0, dict.fromkeys(range(6), ""), COST)}
+    ahead.start(Workload("", {"claim": tuple(works)}, works), {"smoke": range(6)})
+    ahead.wait(worse, [0])
+    judged.set()
+    ahead.stop()
+    assert (log[0], len(log)) == (first, 2)
 
 
 @pytest.mark.parametrize("known", [True, False])

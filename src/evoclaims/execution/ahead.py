@@ -193,6 +193,8 @@ class Ahead:
         for tier in self.reproduction.tiers:
             for names, one in self.reproduction.tier(tier, self.order.variant).conditions.items():
                 if one.id == condition.id:
+                    if self.host.gpus and self._thread is not None:
+                        self._thread.join()  # whose processes have these GPUs' memory
                     seat = Seat(gpus.only(self.host.gpus) if self.host.gpus else {})
                     workers = Workers(replace(self.order, tier=tier), [seat], lambda text: None, self.warn)
                     (ended,) = workers.run([[Job("", *names, tuple(seeds))]])
