@@ -44,8 +44,8 @@ from evoclaims.envs.gates.alu import SimpleAlu  # noqa: E402
 from evoclaims.envs.gates.circuit import Circuit  # noqa: E402
 from evoclaims.envs.gates.parity import NParity  # noqa: E402
 from evoclaims.judging.exact import rank_test  # noqa: E402
-from evoclaims.methods.champion import evaluate  # noqa: E402
 from evoclaims.methods.cma_es import CmaEs  # noqa: E402
+from evoclaims.methods.flat_champion import evaluate  # noqa: E402
 from evoclaims.methods.random_search import RandomSearch  # noqa: E402
 from evoclaims.networks.all_skips import AllSkips  # noqa: E402
 

@@ -18,8 +18,8 @@ from typing import Final
 
 import pytest
 from hypothesis import settings
+from temporary_folders import temporary_folder
 
-from evoclaims.core.files import temporary_folder
 from evoclaims.trials.devices import give_back, share_heaps
 
 pytest_plugins = ["hand_made_paper", "pytester", "tiny_project"]

@@ -245,9 +245,3 @@ class PaperTrials(TrialGroup):
     def always(self, curve: str, value: float) -> Event:
         """A training curve is exactly `value` at every report."""
         return self.event(f"{curve} is always {value:g}", lambda t: all(one == value for one in t.curves[curve]))
-
-    def reports_above(self, curve: str, value: float) -> Measure:
-        """Number of reports at which a training curve has at least `value`."""
-        return self.measure(
-            f"reports with {curve} of {value:g}", lambda t: sum(one >= value for one in t.curves[curve])
-        )

@@ -18,8 +18,8 @@ from evoclaims.core.pytree import pytree, select, strong
 from evoclaims.envs.base import Episode, PolicyFn, Task, averaged
 from evoclaims.methods import CmaEs, HyperNeat, MapElites, Neat, Policy, SeldomDecomposedCmaEs
 from evoclaims.methods.base import Progress
-from evoclaims.methods.champion import Champion, evaluate
 from evoclaims.methods.cma_es import LARGE, CmaEsState
+from evoclaims.methods.flat_champion import Champion, evaluate
 from evoclaims.methods.map_elites import MapElitesState
 from evoclaims.methods.neat.evolution import Evolution, GenomeMethod
 

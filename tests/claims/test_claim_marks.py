@@ -11,7 +11,7 @@ import pytest
 
 from evoclaims import Outcome, claim, expected
 from evoclaims.claims.claim import TIER, Claim, ClaimTest, Expectation, claim_of, expectation_of, gap_of
-from evoclaims.claims.judge import expecting, unjudged
+from evoclaims.claims.report_making import expecting, unjudged
 from evoclaims.core.errors import UserError
 from evoclaims.verdicts.claim_report import ClaimReport, save
 

@@ -12,20 +12,21 @@ import pytest
 
 from evoclaims.claims import earlier_trials
 from evoclaims.claims.claim import Claim, ClaimTest
-from evoclaims.claims.collected import VerdictFixture
 from evoclaims.claims.fetching import NotStoredError, RunMissing, StoredOnly
 from evoclaims.claims.session import Session
+from evoclaims.claims.verdict_fixture import VerdictFixture
 from evoclaims.claims.workload import Work, Workload
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.packages import without_flags
 from evoclaims.core.provenance import changing_flags
 from evoclaims.execution.ahead import Ahead
 from evoclaims.execution.host import Host
-from evoclaims.execution.job import Job, missing_batches
+from evoclaims.execution.job import Job
 from evoclaims.execution.worker import Ended, WorkOrder
 from evoclaims.execution.workers import Workers
 from evoclaims.judging.design import SEQUENTIAL
 from evoclaims.judging.verdict import Outcome
+from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.paper import pilots, references
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.cost import Cost
@@ -77,6 +78,24 @@ def test_the_full_tier_judges_the_papers_own_sentence_with_its_own_design(sessio
     report = session.settle(ClaimTest(says, "full", ""), better.mean_success > worse.mean_success)
     assert (report.name, report.n, report.statement) == ("T1", 10, says.says)
     assert [look.n for look in report.attainable] == [10]
+
+
+def test_a_report_names_all_trials_that_were_looked_at_though_copies_count_once(
+    session: Session, says: Claim, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(HandBuilt, "deterministic", False)
+
+    def fetch(condition: Condition, seeds: Sequence[int]) -> Sequence[TrialResult]:
+        trials = session.fetch(condition, seeds)
+        return [replace(one, champion="c" * 64, curves={}) if one.seed < 3 else one for one in trials]
+
+    copying = replace(session, fetch=fetch)
+    better, worse = _pair(copying, "full")
+    report = copying.settle(ClaimTest(says, "full", ""), better.mean_success > worse.mean_success)
+    assert "(seeds 0, 1, 2)" in report.reason
+    assert "n = 8 instead of 10" in report.reason
+    assert report.n == 10
+    assert report.sources[0].trials == tuple(TrialSpec(better.condition, seed).id for seed in range(10))
 
 
 def test_a_fixed_number_of_trials_takes_the_place_of_the_looks(session: Session, says: Claim) -> None:
@@ -387,26 +406,21 @@ def test_trials_for_the_drift_check_are_asked_of_processes_on_cpus_alone(
     """Of a condition whose claim may come to a third look of twelve trials."""
     session = _with_more(session, 4)
     condition, paper = _pair(session)[0].condition, session.reproduction
-    job = Job("", "better", "small")
-
-    def batch(platform: str, limit: float) -> tuple[int, ...]:
-        (one,) = missing_batches(session.store, paper, "smoke", {job: condition}, range(6), limit, platform)
-        return one.seeds
 
     def ahead(gpus: tuple[str, ...], limit: float) -> tuple[int, ...]:
         asked: list[Job] = []
         monkeypatch.setattr(
             Ahead, "_run", lambda self, runs: asked.extend(job for run in runs for job in run.conditions)
         )
-        works = {condition.id: Work(job.names, "smoke", "", 0, dict.fromkeys(range(12), ""), COST)}
+        works = {condition.id: Work(("better", "small"), "smoke", "", 0, dict.fromkeys(range(12), ""), COST)}
         one = Ahead(Host(2, gpus), WorkOrder("", "", "cpu", 0, 0), paper, session.store, limit, print)
         one.start(Workload("", {"claim": (condition.id,)}, works), {"smoke": range(6)})
         one.stop()
         return asked[0].seeds
 
-    assert batch("cpu", 1e9) == ahead((), 1e9) == (*range(10),)
-    assert batch("gpu", 1e9) == ahead(("0", "1"), 1e9) == (*range(6),)
-    assert batch("cpu", 60.0) == ahead((), 60.0) == (*range(6),)
+    assert ahead((), 1e9) == (*range(10),)
+    assert ahead(("0", "1"), 1e9) == (*range(6),)
+    assert ahead((), 60.0) == (*range(6),)
 
 
 @pytest.mark.parametrize(("gpus", "first"), [(("0", "1"), "ahead"), ((), "due now")])

@@ -70,3 +70,12 @@ def test_retry_leaves_a_torn_record_to_its_own_condition_and_runs_the_others(evo
     assert "run `evoclaims verify`, which moves the file aside" in err
     assert "right on parity (smoke)\n  seed 0: done" in out
     assert "timeout" not in out
+
+
+def test_run_runs_the_seeds_that_it_is_asked_for_and_none_for_the_drift_check(evoclaims: Evoclaims) -> None:
+    paper = Path("tiny_paper.py")
+    tier, more = "Tier(conditions(1), Design.fixed(10)", ', for_drift={("right", "parity"): 5}'
+    paper.write_text(paper.read_text().replace(tier, tier + more))
+    for seeds in (["--first-seed=9", "--trials=1"], []):
+        assert evoclaims("run", "right", "--on=parity", *seeds)[0] == 0
+    assert {result.seed for result in Store(Path(".evoclaims")).results([])} == set(range(10))

@@ -144,7 +144,8 @@ def run(monkeypatch: pytest.MonkeyPatch) -> Run:
             return FakeProcess(order, environment, log, deaths, broken, took)
 
         monkeypatch.setattr(workers, "Process", process)
-        asked = [[Job("", name, "parity") for name in group] for group in groups]
+        named = [[name.partition(" on ") for name in group] for group in groups]
+        asked = [[Job("", method, task or "parity") for method, _, task in group] for group in named]
         return list(Workers(ORDER, places, lambda text: None).run(asked)), log
 
     return started
@@ -168,6 +169,12 @@ def test_a_condition_that_every_process_dies_of_has_failed_and_the_rest_is_done(
     ]
     assert sorted(one.job.method for one in ended) == ["a", "b", "c", "d"]
     assert Counter(name for _, name in log) == Counter(a=1, b=ATTEMPTS, c=1, d=1)
+
+
+def test_a_process_goes_on_with_the_task_that_it_has_traced_if_others_are_hardly_longer(run: Run) -> None:
+    """Not with one of many places later: the longest come first, so that the last end at about the same time."""
+    _, log = run([[f"{name} on {task}"] for name, task in zip("abcdefghij", "xyxstuvwzx", strict=True)])
+    assert "".join(name for _, name in log) == "acbdefghij"
 
 
 def test_a_gpu_where_no_process_starts_costs_no_condition(run: Run, capsys: pytest.CaptureFixture[str]) -> None:

@@ -268,7 +268,7 @@ def test_copies_of_a_training_loop_count_once(source, returned, distinct) -> Non
         attainable = assertion.attainable(distinct, FIXED_10).supported <= FIXED_10.alpha
         assert (verdict.outcome is Outcome.SUPPORTED) == (distinct > 1 and attainable)
         if distinct > 1:
-            assert verdict.n == distinct
+            assert verdict.n == 10
             assert f"which count once: n = {distinct} instead of 10" in verdict.reason
             alone = judge(assertion, replace(FIXED_10, looks=(Look(distinct, FIXED_10.alpha),)))
             if returned(9) != returned(0) and distinct == 9:  # the first nine seeds are those that count
@@ -289,14 +289,26 @@ def test_equal_trials_that_may_be_chance_do_not_make_what_is_rare_look_usual(sou
     at_half = replace(FIXED_10, looks=(Look(10, 0.2),))
     fails = Event(a, "fails", lambda trial: not trial.metrics["score"])
     verdict = judge(fails.in_most_trials(0.5), at_half)
-    assert verdict.n == 5
+    assert "n = 5 instead of 10" in verdict.reason
     assert verdict.outcome is Outcome.INCONCLUSIVE
 
 
 def test_a_second_look_goes_on_behind_copies_in_the_first(source) -> None:
     a = _of_a_loop(source, "a", HIGH, lambda seed: (max(seed, 1) + 0.5, 0, "", False))
     verdict = judge(a.solved().in_most_trials(0.5), replace(FIXED_10, looks=(Look(5, 0.01), Look(10, 0.04))))
-    assert (verdict.outcome, verdict.n) == (Outcome.SUPPORTED, 9)
+    assert (verdict.outcome, verdict.n) == (Outcome.SUPPORTED, 10)
+    assert "n = 9 instead of 10" in verdict.reason
+
+
+def test_copies_and_a_table_too_short_for_the_next_look_are_each_a_clause(source) -> None:
+    a = _of_a_loop(source, "a", HIGH, lambda seed: (max(seed, 3) + 0.5, 0, "", False))
+    a.existing = 5
+    verdict = judge(a.solved().in_most_trials(), replace(FIXED_10, looks=(Look(5, 0.04), Look(10, 0.01))))
+    assert verdict.reason == (
+        "a has copies of the same training (seeds 0, 1, 2, 3), which count once: n = 2 instead of 5; underpowered: "
+        "needs n = 13 at alpha = 0.01; underpowered: needs n = 10 trials of a, and there are 5"
+    )
+    assert verdict.copies == "a has copies of the same training (seeds 0, 1, 2, 3)"
 
 
 def test_trials_of_a_training_loop_in_a_pilot_which_keeps_no_digests_are_evidence(source) -> None:

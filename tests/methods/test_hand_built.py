@@ -15,7 +15,7 @@ from evoclaims.envs.gates.alu import SimpleAlu
 from evoclaims.envs.gates.circuit import TruthTable
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.hand_built import HandBuilt
-from evoclaims.trials.program import score_every_level
+from evoclaims.trials.program import examine_every_level
 
 GATES = [
     *(NParity(bits) for bits in range(2, 9)),
@@ -35,7 +35,7 @@ def test_it_is_exactly_right_at_every_level_and_its_negation_exactly_wrong(
 ) -> None:
     method = HandBuilt(negated)
     policy = method.best(task, method.init(jax.random.key(0), task))
-    final = jax.jit(lambda key: score_every_level(task, policy, key))(jax.random.key(0))
+    final = jax.jit(lambda key: examine_every_level(task, policy, key))(jax.random.key(0))
     np.testing.assert_array_equal(final.success, np.full(task.levels, success, np.float32))
     np.testing.assert_array_equal(final.fitness, np.full(task.levels, fitness, np.float32))
 
@@ -51,7 +51,7 @@ class DeafParity(NParity):
 
 def test_a_wrong_truth_table_does_not_make_it_wrong_alike() -> None:
     task = DeafParity(4)
-    final = score_every_level(task, HandBuilt().best(task, jax.numpy.int32(0)), jax.random.key(0))
+    final = examine_every_level(task, HandBuilt().best(task, jax.numpy.int32(0)), jax.random.key(0))
     np.testing.assert_array_equal(final.success, [1.0, 1.0, 0.5])
 
 

@@ -12,8 +12,8 @@ import pytest
 from test_cma_es import POPULATION, Ellipsoid, Itself
 
 from evoclaims.core.errors import UserError
-from evoclaims.methods.champion import first_champion
 from evoclaims.methods.cma_es import CmaEs, CmaEsState, SeldomDecomposedCmaEs
+from evoclaims.methods.flat_champion import first_champion
 
 pytestmark = pytest.mark.newest
 

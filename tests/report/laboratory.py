@@ -13,7 +13,7 @@ from made_trials import trial_of
 
 from evoclaims.claims.claim import Claim, ClaimTest
 from evoclaims.claims.fetching import StoredOnly
-from evoclaims.claims.judge import unjudged
+from evoclaims.claims.report_making import unjudged
 from evoclaims.claims.session import Session
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.judging.assertion import Assertion

@@ -261,7 +261,7 @@ def test_an_examination_that_gives_something_else_is_refused(give: Any, what: st
     number, mark = jax.ShapeDtypeStruct((), jnp.int32), jax.ShapeDtypeStruct((), bool)
     trial = jax.eval_shape(program.start, number, mark)
     with pytest.raises(UserError) as caught:
-        jax.eval_shape(program.score, trial)
+        jax.eval_shape(program.examine, trial)
     assert str(caught.value).startswith(f"{BOTH}the examination by 'n_parity' gives {what}")
 
 

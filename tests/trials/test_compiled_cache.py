@@ -8,10 +8,10 @@ from pathlib import Path
 
 import jax
 import pytest
+import temporary_folders
+from temporary_folders import ALIVE, temporary_folder
 from test_lanes import compilation_cache, tear
 
-from evoclaims.core import files
-from evoclaims.core.files import ALIVE, temporary_folder
 from evoclaims.trials import devices
 from evoclaims.trials.devices import sweep
 
@@ -83,9 +83,9 @@ def test_beyond_a_bound_what_was_used_longest_ago_goes(tmp_path: Path, monkeypat
 
 
 def test_temporary_folders_of_killed_processes_go(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(files.tempfile, "gettempdir", lambda: str(tmp_path))
-    monkeypatch.setattr(files.tempfile, "mkdtemp", lambda prefix: str(_made(tmp_path / f"{prefix}new")))
-    monkeypatch.setattr(files, "_held", [])
+    monkeypatch.setattr(temporary_folders.tempfile, "gettempdir", lambda: str(tmp_path))
+    monkeypatch.setattr(temporary_folders.tempfile, "mkdtemp", lambda prefix: str(_made(tmp_path / f"{prefix}new")))
+    monkeypatch.setattr(temporary_folders, "_held", [])
     killed, young, foreign = (_made(tmp_path / f"evoclaims-{each}") for each in ("killed", "young", "foreign"))
     for folder in (killed, young):
         (folder / ALIVE).touch()

@@ -111,7 +111,7 @@ def _computing(condition: Condition) -> tuple[set[str], set[str]]:
             programs = [
                 first,
                 jax.make_jaxpr(program.advance)(shapes, np.int32(1)),
-                jax.make_jaxpr(program.score)(shapes),
+                jax.make_jaxpr(program.examine)(shapes),
             ]
     finally:
         sys.setprofile(before)

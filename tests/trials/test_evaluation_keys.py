@@ -70,7 +70,7 @@ def _keys(condition: Condition, seed: int) -> tuple[set[Key], set[Key]]:
         return result, set(_seen)
 
     trial, training = noted(train)
-    _, evaluation = noted(program.score, trial)
+    _, evaluation = noted(program.examine, trial)
     return training, evaluation
 
 

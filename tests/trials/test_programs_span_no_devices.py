@@ -45,7 +45,7 @@ def test_every_program_is_compiled_for_one_device(layout: Layout, cpus: list[Any
     programs = Lanes(walk(), cpus).programs(4)
     assert len(programs) == (4 if layout.alone else 2)
     for program in {id(one): one for one in programs}.values():
-        for compiled in (program.advance, program.score):
+        for compiled in (program.advance, program.examine):
             assert "num_partitions" not in compiled.as_text().splitlines()[0]  # type: ignore[attr-defined]
 
 

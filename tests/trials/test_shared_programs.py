@@ -31,7 +31,7 @@ def _texts(task: Obstacles) -> list[str]:
     """Return what the compiler is given: to start, to train, and to judge."""
     program = _program(task)
     trial = jax.eval_shape(program.start, SEED, NOT_IDLE)
-    programs = (program.start, (SEED, NOT_IDLE)), (program.advance, (trial, ONE)), (program.score, (trial,))
+    programs = (program.start, (SEED, NOT_IDLE)), (program.advance, (trial, ONE)), (program.examine, (trial,))
     return [jax.jit(function).lower(*arguments).as_text() for function, arguments in programs]
 
 

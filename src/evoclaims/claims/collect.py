@@ -16,7 +16,7 @@ import pytest
 
 from evoclaims.claims.claim_names import claim_tests
 from evoclaims.claims.collected import Collected, Recorder, renew
-from evoclaims.claims.judge import broken
+from evoclaims.claims.report_making import broken
 from evoclaims.claims.session import SESSION, Session
 from evoclaims.core.errors import UserError, in_one_line
 from evoclaims.paper.config import SuiteConfig
@@ -93,7 +93,7 @@ def judge_all(session: Session, collected: Iterable[Collected], root: Path) -> l
     made = []
     for one in collected:
         report = one.report
-        if one.assertion is not None and one.judge is not session:
+        if one.assertion is not None and one.reader is not session:
             try:
                 # What a project's measures print is not shown, and what they warn of is treated as in the test.
                 with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings(record=True):
@@ -223,7 +223,7 @@ def _same(recorder: Recorder, before: Iterable[list[Collected]]) -> list[Collect
 
     A session of the protocol itself judges each claim during a call of its own.
     """
-    if recorder.judge is not None and not recorder.variant:
+    if recorder.reader is not None and not recorder.variant:
         return []
     return next((found for found in before if found and all(map(recorder.has_conditions_of, found))), [])
 

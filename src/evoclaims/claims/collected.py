@@ -12,11 +12,10 @@ import pytest
 
 from evoclaims.claims.claim import TIER, ClaimTest, Expectation, gap_of
 from evoclaims.claims.fetching import NotStoredError
-from evoclaims.claims.judge import Reading, unjudged
+from evoclaims.claims.report_making import Reading, unjudged
 from evoclaims.claims.session import Session
-from evoclaims.core.errors import UserError
+from evoclaims.claims.verdict_fixture import VerdictFixture
 from evoclaims.judging.assertion import Assertion
-from evoclaims.judging.measure import Event, Measure, Profile
 from evoclaims.judging.reading import TrialReading
 from evoclaims.judging.sample import Source
 from evoclaims.judging.verdict import Outcome
@@ -26,61 +25,6 @@ from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.history import key_of
-from evoclaims.verdicts.readings import moment
-
-
-@dataclass
-class VerdictFixture:
-    """Takes exactly one assertion per test, settles it, and keeps its report."""
-
-    settle: Callable[[Assertion, Sequence[Reading]], object]
-    report: Any = None
-    readings: list[Reading] = field(default_factory=list)
-
-    def __call__(self, assertion: Assertion) -> None:
-        """Judge the claim's assertion.
-
-        Raises:
-            UserError: for a second assertion, or a value that is not one.
-        """
-        if not isinstance(assertion, Assertion):
-            alone = isinstance(assertion, Measure | Event | Profile)
-            if callable(assertion):
-                name = getattr(assertion, "__name__", type(assertion).__name__)
-                raise UserError(f"verdict(...) was given the function {name} itself: call it, as in {name}().")
-            raise UserError(
-                f"verdict(...) takes an assertion about trials, such as verdict(a.mean_success > b.mean_success), "
-                f"not {f'{assertion.name!r} alone: compare it with something' if alone else repr(assertion)}."
-            )
-        if self.report is not None:
-            raise UserError("A claim has one verdict: join several assertions with & (and) or | (or).")
-        self.report = self.settle(assertion, self.readings)
-
-    def reading(self, name: str, assertion: Assertion, *, because: str, since: str) -> None:
-        """Add another reading of the claim's sentence, before `verdict(...)`: the verdict shows whether it depends.
-
-        It counts where the paper's own sentence is judged, not at a tier with a smaller statement.
-
-        Args:
-            name: a few words.
-            assertion: what the sentence says if it is read so.
-            because: why it may be read so.
-            since: when the reading was written, such as "2026-11-26" or "2026-11-26 14:30" (UTC).
-
-        Raises:
-            UserError: after the verdict, for a name that is taken, a missing text, or something else than a date or an
-                assertion.
-        """
-        if self.report is not None:
-            raise UserError(f"The reading {name!r} comes after the verdict: write verdict.reading(...) before it.")
-        if not isinstance(assertion, Assertion):
-            raise UserError(
-                f"The reading {name!r} is {assertion!r}, which is not an assertion. Write one, as for verdict(...)."
-            )
-        if not (name.strip() and because.strip()) or name in (one.name for one in self.readings):
-            raise UserError(f"The reading {name!r} needs a unique name and because=...: why the sentence means this.")
-        moment(since)
-        self.readings.append(Reading(name, assertion, because, since))
 
 
 @dataclass(frozen=True)
@@ -90,7 +34,7 @@ class Collected:
     Attributes:
         test: the claim, the tier and the case.
         report: the verdict where it was judged; else why nothing is asserted: the test broke, is skipped or missing.
-        judge: the session that judged it during the call; None where nothing did.
+        reader: the session that judged it during the call; None where nothing did.
         expectation: the accepted outcome.
         skipped: whether the test is skipped, or missing at its tier.
         assertion: what it passes to `verdict(...)`; None where it did not get there.
@@ -101,7 +45,7 @@ class Collected:
 
     test: ClaimTest
     report: ClaimReport
-    judge: Session | None = None
+    reader: Session | None = None
     expectation: Expectation | None = None
     skipped: bool = False
     assertion: Assertion | None = None
@@ -136,16 +80,16 @@ def never(condition: Condition, seeds: Sequence[int]) -> Sequence[TrialResult]:
 class Recorder(Session):
     """A session that keeps what each test asserts.
 
-    It judges nothing by itself. With a judge, each test's assertion is judged during the call, as a run of pytest does:
+    It judges nothing by itself. With a reader, an assertion is judged during its test's call, as a run of pytest does:
     what a measure reads besides trials may be gone when the test has ended.
 
     Attributes:
-        judge: a session that only reads trials.
+        reader: a session that only reads trials.
         tests: what each test judges, by `ClaimTest.key`; filled in before tests are called.
         found: what has been collected so far, in the order of the calls.
     """
 
-    judge: Session | None = None
+    reader: Session | None = None
     tests: dict[tuple[str, str], ClaimTest] = field(default_factory=dict)
     found: list[Collected] = field(default_factory=list)
     _asked: list[TrialGroup] = field(default_factory=list)
@@ -153,7 +97,7 @@ class Recorder(Session):
 
     @staticmethod
     def of(session: Session) -> Recorder:
-        """Return a recorder for the protocol of a session, without a judge."""
+        """Return a recorder for the protocol of a session, without a reader."""
         return Recorder(session.reproduction, session.store, never, session.trials, session.variant)
 
     def group(self, method: str, on: str, tier: str) -> TrialGroup:
@@ -162,13 +106,13 @@ class Recorder(Session):
         return self._asked[-1]
 
     def settle(self, test: ClaimTest, assertion: Assertion, others: Sequence[Reading] = ()) -> ClaimReport:
-        """Keep an assertion, and judge it if there is a judge."""
-        if self.judge is not None:
-            report = self.judge.settle(test, assertion, others)
+        """Keep an assertion, and have it judged by the reader if there is one."""
+        if self.reader is not None:
+            report = self.reader.settle(test, assertion, others)
         else:
             report = unjudged(test, Outcome.NOT_RUN, "it is not judged")
         kept = {"assertion": assertion, "readings": tuple(others), "filters": tuple(warnings.filters)}
-        more = {**kept, "judge": self.judge}
+        more = {**kept, "reader": self.reader}
         self._asserted[:] = [(report, more)]
         return report
 

@@ -11,7 +11,8 @@ import pytest
 from evoclaims.claims.as_published import AsPublished
 from evoclaims.claims.claim import ClaimTest, Expectation
 from evoclaims.claims.fetching import RunMissing, StoredOnly
-from evoclaims.claims.judge import (
+from evoclaims.claims.null_agents import satisfied_by
+from evoclaims.claims.report_making import (
     Reading,
     chance_of_inconclusive,
     crash_shown_by,
@@ -20,7 +21,6 @@ from evoclaims.claims.judge import (
     read_as,
     without_trials,
 )
-from evoclaims.claims.null_agents import satisfied_by
 from evoclaims.core.errors import UserError
 from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.design import Design, Look
@@ -81,7 +81,7 @@ class Session:
         return self.fetch.archive if isinstance(self.fetch, StoredOnly) else self.store
 
     @property
-    def reads(self) -> bool:
+    def only_reads(self) -> bool:
         """Whether it only reads trials."""
         return isinstance(self.fetch, StoredOnly)
 
@@ -117,7 +117,7 @@ class Session:
         if self.variant:
             return report
         report = replace(crash_shown_by(report, assertion), chance=self._chance(report, assertion, design))
-        if not self.reads or not claim.is_read_at(test.tier):
+        if not self.only_reads or not claim.is_read_at(test.tier):
             return report
         first = Reading(claim.read, assertion, "the assertion that the claim judges", claim.since)
         own = read_as(first, design, self.trials_of, report.outcome)
@@ -132,13 +132,13 @@ class Session:
         if not agents or not report.n or report.is_control or isinstance(self.fetch, AsPublished):
             return ()
         look = Look(report.n, design.alpha)
-        if self.reads and assertion.attainable(look.n, design).supported > look.alpha:
+        if self.only_reads and assertion.attainable(look.n, design).supported > look.alpha:
             look = Look(design.last.n, design.alpha)
 
         def others(method: str, task: str) -> TrialGroup:
             return self.group(method, task, report.tier)
 
-        return satisfied_by(agents, assertion, look, design, self.trials_of, others if self.reads else None)
+        return satisfied_by(agents, assertion, look, design, self.trials_of, others if self.only_reads else None)
 
     def _chance(self, report: ClaimReport, assertion: Assertion, design: Design) -> float | None:
         """Return how often an inconclusive claim ends so in draws from its pilots, if it was accepted as supported."""
@@ -172,7 +172,7 @@ class Session:
             complete = replace(complete, tried=mutation_matrix.tried(self.mutants, complete))
         if last is not None:
             complete = history.following(complete, last)
-        return located(complete, root) if self.reads else save(complete, root)
+        return located(complete, root) if self.only_reads else save(complete, root)
 
     def skipped(self, report: ClaimReport) -> ClaimReport:
         """Return the report of a claim whose test is skipped or missing: as it is, since nothing is kept of it."""

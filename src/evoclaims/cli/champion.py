@@ -8,15 +8,15 @@ from evoclaims.cli.project import open_project
 from evoclaims.cli.stored_trial import describe, load
 from evoclaims.cli.terminal import styled
 from evoclaims.report.console import PlainSpokenConsole, plain_table
-from evoclaims.trials import champions, devices
-from evoclaims.trials.champions import Replay
+from evoclaims.trials import champion_replay, devices
+from evoclaims.trials.champion_replay import Replay
 
 
 def main(options: argparse.Namespace) -> int:
     """Replay; 1 when the replay differs from the record."""
     project, chosen = open_project(options.storage), devices.choose(options.device)
     trial = load(project, options.tier, options.method, options.on, options.seed)
-    replay = champions.replay(trial.condition, trial.result, trial.parameters, chosen)
+    replay = champion_replay.replay(trial.condition, trial.result, trial.parameters, chosen)
     print(f"{trial.title}\n  {describe(trial.result)}")
     # Each value as recorded and as replayed, to the last digit of a float32.
     columns = [values[name] for name in ("success", "fitness") for values in (replay.again, replay.recorded)]

@@ -79,7 +79,7 @@ class Project:
 
         A session that reads trials judges a claim during its call; others judge what has been collected.
         """
-        readers = {id(session): session for session, _ in asked if session.reads}
+        readers = {id(session): session for session, _ in asked if session.only_reads}
         tiers = {key: list(dict.fromkeys(tier for one, tier in asked if id(one) == key)) for key in readers}
         asking = [(self._recorder(one.variant, one), tiers[key]) for key, one in readers.items()]
         found = dict(zip(readers, collect(self.config, asking) if asking else (), strict=True))
@@ -107,9 +107,9 @@ class Project:
                 self._collected.update(((variant, tier), _of_tier(found, tier)) for tier in tiers[variant])
         return [self._collected[one] for one in asked]
 
-    def _recorder(self, variant: str, judge: Session | None = None) -> Recorder:
-        fetch = judge.fetch if judge else never
-        return Recorder(self.reproduction, self.store, fetch, variant=variant, judge=judge)
+    def _recorder(self, variant: str, reader: Session | None = None) -> Recorder:
+        fetch = reader.fetch if reader else never
+        return Recorder(self.reproduction, self.store, fetch, variant=variant, reader=reader)
 
     @cached_property
     def _collected(self) -> dict[tuple[str, str], list[Collected]]:

@@ -6,7 +6,6 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from evoclaims.claims.fetching import more_for_drift
 from evoclaims.cli.project import Project, open_project
 from evoclaims.cli.running import Execution, choose
 from evoclaims.cli.stored_trial import describe
@@ -83,12 +82,7 @@ def main(options: argparse.Namespace) -> int:
     if options.retry:
         for condition in wanted.values():
             store.forget_timeouts((TrialSpec(condition, seed).id for seed in seeds), condition.versions)
-    known, limit, platform = reproduction.seeds_for_drift, running.limit, running.platform
-    complete = {
-        job
-        for job, one in wanted.items()
-        if not StoredTrials(store, one).missing([*seeds, *more_for_drift(known, one.id, seeds, limit, platform)])
-    }
+    complete = {job for job, condition in wanted.items() if not StoredTrials(store, condition).missing(seeds)}
     failed = 0
     for ended in running.run(wanted, lambda text: print(f"  {text}", flush=True)):
         name = f"{ended.job.label} ({options.tier})"

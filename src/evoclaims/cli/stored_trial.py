@@ -18,7 +18,7 @@ from evoclaims.core.printable import printable
 from evoclaims.paper import references
 from evoclaims.paper.cost import Estimator, Wanted
 from evoclaims.report.live_line import duration
-from evoclaims.trials import champions, devices
+from evoclaims.trials import champion_replay, devices
 from evoclaims.trials.devices import MATMUL_PRECISION
 from evoclaims.trials.failed import time_allowed, why
 from evoclaims.trials.imported import where_from
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Stored:
-    """A trial out of the store: its record, its champion's parameters (see `champions.load`), and where these are."""
+    """A trial out of the store: its record, its champion's parameters (see `champion_replay.load`), and both places."""
 
     title: str
     condition: Condition
@@ -47,7 +47,7 @@ def load(project: Project, tier: str, method: str, task: str, seed: int) -> Stor
 
     Raises:
         UserError: for unknown names, a trial that is not stored (with the command that runs it and what that takes),
-            and as `champions.load` does.
+            and as `champion_replay.load` does.
     """
     reproduction, store = project.reproduction, project.store
     condition, title = reproduction.tier(tier).condition(method, task), f"{method} on {task} ({tier})"
@@ -60,7 +60,7 @@ def load(project: Project, tier: str, method: str, task: str, seed: int) -> Stor
             arrays = references.champion_of(reproduction.references, tier, trial) if trial.seed == seed else None
             if arrays is not None:
                 file = references.champion_path(reproduction.references, tier, trial)
-                return Stored(title, condition, trial, champions.unpacked(arrays, condition, trial), file)
+                return Stored(title, condition, trial, champion_replay.unpacked(arrays, condition, trial), file)
         estimator = Estimator(store, reproduction, tier, devices.choose("auto")[0].platform)
         cost = estimator.owed({"": Wanted((method, task), condition, [seed])})[""].cost
         takes = "" if cost.basis == "budget" else f", in about {duration(cost.seconds())}"
@@ -68,7 +68,7 @@ def load(project: Project, tier: str, method: str, task: str, seed: int) -> Stor
             f"{store.root} holds no trial of {title} with seed {seed}, and no champion of it is committed. "
             f"`evoclaims run {method} --on {task} --tier {tier} --trials 1 --first-seed {seed}` runs it{takes}."
         )
-    return Stored(title, condition, result, champions.load(store, condition, result), store.champion_file(result))
+    return Stored(title, condition, result, champion_replay.load(store, condition, result), store.champion_file(result))
 
 
 def describe(result: TrialResult) -> str:

@@ -6,7 +6,6 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from evoclaims.claims.fetching import more_for_drift
 from evoclaims.mutants.mutant import Planted
 from evoclaims.paper.cost import Cost, Estimator, Wanted
 from evoclaims.paper.reproduction import Conditions, Names, Reproduction
@@ -75,7 +74,7 @@ def missing_batches(
     limit: float,
     platform: str,
 ) -> list[MissingBatch]:
-    """List the batches of these conditions and seeds that the store lacks, the longest first; with those for drift.
+    """List the batches of these conditions and seeds that the store lacks, the longest first.
 
     Args:
         store: where trials are kept.
@@ -87,10 +86,6 @@ def missing_batches(
         platform: where they will run: "cpu" or "gpu".
     """
     estimator = Estimator(store, reproduction, tier, platform, time_limit=limit)
-    known = reproduction.seeds_for_drift
-    asked = {
-        job: [*seeds, *more_for_drift(known, condition.id, seeds, limit, platform)] for job, condition in wanted.items()
-    }
-    owed = estimator.owed({job: Wanted(job.names, wanted[job], asked[job]) for job in wanted})
+    owed = estimator.owed({job: Wanted(job.names, condition, seeds) for job, condition in wanted.items()})
     batches = [MissingBatch(job, one.seeds, one.cost) for job, one in owed.items() if one.seeds]
     return sorted(batches, key=lambda batch: -batch.cost.seconds())

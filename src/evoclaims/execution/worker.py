@@ -129,10 +129,10 @@ def condition_of(reproduction: Reproduction, order: WorkOrder, job: Job) -> Cond
 
 def run_jobs(opened: Opened, order: WorkOrder, asked: Iterable[Job], line: LiveLine) -> Iterator[Ended]:
     """Run the missing trials of conditions one after the other; an error in one does not stop the others."""
-    limit, for_drift = opened.config.seconds(order.time_limit), opened.reproduction.seeds_for_drift
+    limit = opened.config.seconds(order.time_limit)
     for job in asked:
         watch = _named(line, job)
-        fetch = RunMissing(opened.store, order.device, watch, limit, order.any_version, for_drift=for_drift)
+        fetch = RunMissing(opened.store, order.device, watch, limit, order.any_version)
         try:
             condition = condition_of(opened.reproduction, order, job)
             with contextlib.closing(line):

@@ -111,6 +111,9 @@ ATTEMPTS: Final = 3
 SMALL: Final = 1 / 8
 """Conditions that share programs are run by one process if they take less than this part of what each has to do."""
 
+NEAR: Final = 6
+"""Among how many groups, the longest first, a process looks for one whose task it has traced already."""
+
 
 def in_queue(batches: Sequence[MissingBatch], sound: Conditions, processes: int) -> list[tuple[Job, ...]]:
     """Return conditions as processes take them, the longest first, so that the last ones end at about the same time.
@@ -224,18 +227,25 @@ class Workers:
             left = self._run(process, group) if process else group
             process = process if process in self._processes else None
             self._give_back(left)
-            group = self._next() if seat.first is None and failures < ATTEMPTS else ()
+            known = group[-1].task if process else ""
+            group = self._next(known) if seat.first is None and failures < ATTEMPTS else ()
         if process is not None:
             self._dismiss(process)
 
-    def _next(self) -> tuple[Job, ...]:
-        """Take the first group that is left; empty when all have ended: one that runs may yet be given back."""
+    def _next(self, known: str = "") -> tuple[Job, ...]:
+        """Take the first group that is left; empty when all have ended: one that runs may yet be given back.
+
+        One of the task that this process has `known` comes before those that are hardly longer: it need not be traced.
+        """
         with self._changed:
             self._changed.wait_for(lambda: bool(self._left) or not self._running or self._stopping)
             if not self._left or self._stopping:
                 return ()
             self._running += 1
-            return self._left.popleft()
+            soon = list(self._left)[:NEAR]
+            group = next((one for one in soon if one[0].task == known), soon[0])
+            self._left.remove(group)
+            return group
 
     def _give_back(self, left: tuple[Job, ...]) -> None:
         """Count a group as running no more, and put what has not ended in front of the others."""

@@ -16,7 +16,7 @@ from evoclaims.figures import sheet
 from evoclaims.figures.figure import Drawing, Heading, Scope
 from evoclaims.figures.sheet import FAINT, SMALL, TEXT, plain
 from evoclaims.figures.trial_numbers import MeasureOf, TrialNumbers, absences, frame, read
-from evoclaims.trials import champions
+from evoclaims.trials import champion_replay
 
 LINE: Final = 0.12
 """Height of a line below a panel, inches."""
@@ -96,7 +96,7 @@ def _first_map(scope: Scope, ground: Ground) -> Map | None:
     condition = scope.tier.condition(ground.method, ground.task)
     for result in scope.group(ground.method, ground.task).fetch(scope.seeds):
         if scope.archive.store.has_champion(result):
-            _, fitnesses = champions.load(scope.archive.store, condition, result)
+            _, fitnesses = champion_replay.load(scope.archive.store, condition, result)
             return Map(result.seed, result.id, np.asarray(fitnesses))
     return None
 

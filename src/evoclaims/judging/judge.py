@@ -48,11 +48,12 @@ class Ending:
 
     Attributes:
         outcome: of the assertion.
-        look: the look.
-        trials: what was looked at.
+        look: the look, with as many trials as count.
+        trials: those that count.
         finding: what they say; None where trials crashed or cannot be read.
         note: why judging ended without a decision or before it, if it did; without a finding, the reason.
         copies: which trials are copies of each other.
+        left_out: how many trials per side were looked at and do not count, since they are copies.
         doubt: why a decision of the tests does not count: it hangs on trials that ran out of time.
     """
 
@@ -62,6 +63,7 @@ class Ending:
     finding: Finding | None
     note: str = ""
     copies: str = ""
+    left_out: int = 0
     doubt: str = ""
 
 
@@ -89,16 +91,16 @@ def judge(
     ending = decide(assertion, design, fetch)
     if ending is None:
         return _underpowered(assertion, design, mark)
-    outcome, look, finding = ending.outcome, ending.look, ending.finding
+    outcome, look, finding, n = ending.outcome, ending.look, ending.finding, ending.look.n + ending.left_out
     if finding is None:
-        return Verdict(outcome, ending.note, assertion.describe(), mark, n=look.n)
+        return Verdict(outcome, ending.note.removesuffix("; "), assertion.describe(), mark, n=n, copies=ending.copies)
     tested = any(entry.p is not None for entry in finding.evidence)  # a fact has no p
     return Verdict(
         outcome=outcome,
         reason=ending.note + (ending.doubt or _reason(finding, look, assertion, design)),
         describe=assertion.describe(),
         fingerprint=mark,
-        n=look.n,
+        n=n,
         alpha=look.alpha,
         p=finding.p.supported if tested else None,
         attainable_p=finding.attainable.supported if tested else None,
@@ -260,15 +262,15 @@ def _counted_once(assertion: Assertion, design: Design, look: Look, trials: Tria
     counted = Look(found.kept, look.alpha)
     what = f"{found.sentence}, which count once: n = {found.kept} instead of {look.n}; "
     if not _decidable(assertion.attainable(counted.n, design), counted.alpha):
-        note = f"{what}underpowered: {_needs(assertion, design)}"
-        return Ending(Outcome.INCONCLUSIVE, counted, found.trials, None, note, copies=found.sentence)
+        note = f"{what}underpowered: {_needs(assertion, design)}; "
+        return Ending(Outcome.INCONCLUSIVE, counted, found.trials, None, note, found.sentence, look.n - found.kept)
     of_all = assertion.find(trials, design, look.alpha).p.outcome(look.alpha)
     finding = assertion.find(found.trials, design, counted.alpha)
     outcome = finding.p.outcome(counted.alpha)
     if outcome is not of_all and outcome is not Outcome.INCONCLUSIVE:
         what += f"with all {look.n} trials it would be {of_all}, and decided is what both show; "
     agreed = outcome if outcome is of_all else Outcome.INCONCLUSIVE
-    return Ending(agreed, counted, found.trials, finding, what, copies=found.sentence)
+    return Ending(agreed, counted, found.trials, finding, what, found.sentence, look.n - found.kept)
 
 
 def _without_result(assertion: Assertion, trials: Trials) -> str:

@@ -2,11 +2,11 @@ from evoclaims.core.keys import streams as streams
 from evoclaims.methods.base import Method as Method
 from evoclaims.methods.base import Policy as Policy
 from evoclaims.methods.base import Progress as Progress
-from evoclaims.methods.champion import champion_policy as champion_policy
-from evoclaims.methods.champion import evaluate_with_champion as evaluate_with_champion
-from evoclaims.methods.champion import first_champion as first_champion
 from evoclaims.methods.cma_es import CmaEs as CmaEs
 from evoclaims.methods.cma_es import SeldomDecomposedCmaEs as SeldomDecomposedCmaEs
+from evoclaims.methods.flat_champion import champion_policy as champion_policy
+from evoclaims.methods.flat_champion import evaluate_with_champion as evaluate_with_champion
+from evoclaims.methods.flat_champion import first_champion as first_champion
 from evoclaims.methods.hand_built import HandBuilt as HandBuilt
 from evoclaims.methods.hyperneat import CPPN_FUNCTIONS as CPPN_FUNCTIONS
 from evoclaims.methods.hyperneat import HyperNeat as HyperNeat

@@ -17,7 +17,7 @@ from evoclaims.core.keys import streams
 from evoclaims.core.pytree import pytree, strong
 from evoclaims.envs.base import Task
 from evoclaims.methods.base import Policy, Progress
-from evoclaims.methods.champion import Champion, champion_policy, evaluate_with_champion, first_champion
+from evoclaims.methods.flat_champion import Champion, champion_policy, evaluate_with_champion, first_champion
 from evoclaims.networks.all_skips import AllSkips
 from evoclaims.networks.base import Network
 

@@ -20,7 +20,7 @@ from evoclaims.core.keys import streams
 from evoclaims.core.pytree import pytree, strong
 from evoclaims.envs.base import Episode, Task, share
 from evoclaims.methods.base import Policy, Progress
-from evoclaims.methods.champion import policy_of
+from evoclaims.methods.flat_champion import policy_of
 from evoclaims.networks.mlp import Mlp
 
 if TYPE_CHECKING:  # where it is used it is imported, which takes time

@@ -11,7 +11,7 @@ from jaxtyping import Array, Int, PRNGKeyArray
 
 from evoclaims.envs.base import Task
 from evoclaims.methods.base import Policy, Progress
-from evoclaims.methods.champion import Champion, champion_policy, evaluate, first_champion
+from evoclaims.methods.flat_champion import Champion, champion_policy, evaluate, first_champion
 from evoclaims.networks.base import Network
 from evoclaims.networks.mlp import Mlp
 

@@ -22,7 +22,7 @@ from evoclaims.core.keys import streams
 from evoclaims.core.pytree import pytree, strong
 from evoclaims.envs.base import Episode, PolicyFn, Task
 from evoclaims.methods.base import Policy, Progress
-from evoclaims.methods.champion import no_episode
+from evoclaims.methods.flat_champion import no_episode
 from evoclaims.methods.neat.settings import PAPER, Settings
 from evoclaims.networks.activations import ACTIVATIONS
 from evoclaims.networks.genome import Genome

@@ -59,7 +59,7 @@ class SuiteConfig:
         root: the project's folder, put on the import path.
         reproduction: module that holds `REPRODUCTION`.
         claims: folder of claim tests, relative to `root`.
-        time_limit: time that a batch of trials may take, such as "90s" or "24h" (see `trials.time_limit`).
+        time_limit: time that a batch of trials may take, such as "90s" or "24h" (see `seconds_of`).
         slurm: what this site's jobs ask for (`[tool.evoclaims.slurm]`), as `evoclaims submit` reads it.
     """
 

@@ -23,20 +23,20 @@ from evoclaims.core.tiers import TIERS
 from evoclaims.plugin import options
 from evoclaims.plugin.options import AHEAD, import_from_root, make_session
 from evoclaims.plugin.options import pytest_addoption as pytest_addoption
-from evoclaims.plugin.order import prepare
 from evoclaims.plugin.outcomes import VERDICTS
 from evoclaims.plugin.outcomes import pytest_report_teststatus as pytest_report_teststatus
 from evoclaims.plugin.outcomes import pytest_runtest_call as pytest_runtest_call
 from evoclaims.plugin.outcomes import pytest_runtest_makereport as pytest_runtest_makereport
 from evoclaims.plugin.outcomes import pytest_runtest_setup as pytest_runtest_setup
 from evoclaims.plugin.progress import QUIET, ProgressLine, progress_of
+from evoclaims.plugin.start import prepare
 from evoclaims.plugin.summary import COLLECTED, KNOWN, TROUBLE, Summary
 from evoclaims.trials.gpus import gpus
 from evoclaims.trials.stopping import end_without, interrupted_by
 
 if TYPE_CHECKING:
     from evoclaims.claims.claim import ClaimTest
-    from evoclaims.claims.collected import VerdictFixture
+    from evoclaims.claims.verdict_fixture import VerdictFixture
     from evoclaims.paper.trial_group import TrialGroup
     from evoclaims.verdicts.claim_report import ClaimReport
 
@@ -314,7 +314,7 @@ def trials(request: pytest.FixtureRequest, _claim_tier: str) -> Callable[..., Tr
 def verdict(request: pytest.FixtureRequest, _claim_tier: str) -> VerdictFixture:
     """Return `verdict(assertion)`, which judges the claim."""
     from evoclaims.claims.claim import ClaimTest
-    from evoclaims.claims.collected import VerdictFixture
+    from evoclaims.claims.verdict_fixture import VerdictFixture
 
     session, test = make_session(request.config), ClaimTest.of(request.node)
     line = progress_of(request.config)

@@ -18,7 +18,7 @@ from evoclaims.plugin.options import make_session
 from evoclaims.plugin.summary import ATTRIBUTE
 
 if TYPE_CHECKING:
-    from evoclaims.claims.collected import VerdictFixture
+    from evoclaims.claims.verdict_fixture import VerdictFixture
     from evoclaims.verdicts.claim_report import ClaimReport
 
 
@@ -186,7 +186,7 @@ def _claim_report(
 ) -> ClaimReport:
     """Return the report of a claim test: its verdict, the error that prevented one, or why it was skipped."""
     from evoclaims.claims.claim import ClaimTest, expectation_of
-    from evoclaims.claims.judge import broken, unjudged
+    from evoclaims.claims.report_making import broken, unjudged
     from evoclaims.judging.verdict import Outcome
     from evoclaims.verdicts.history import key_of
 

@@ -33,11 +33,11 @@ class Compiled:
     """The programs of a condition for one share of the lanes.
 
     Attributes:
-        advance, score: compiled; all arguments and results have a leading axis [lanes of the share].
+        advance, examine: compiled; all arguments and results have a leading axis [lanes of the share].
     """
 
     advance: Callable[..., tuple[TrialState, Report]]
-    score: Callable[..., Score]
+    examine: Callable[..., Score]
 
 
 class Lanes:
@@ -98,10 +98,11 @@ class Lanes:
         known = np.array([0 if seed is None else seed for seed in seeds], np.int32)
         idle = np.array([seed is None for seed in seeds])
         size, homes = self._shares(width)
+        distinct = list(dict.fromkeys(homes))
         began = working_time()
         with self._settings():
-            lowered = [self._lowered(self._program.start, home, _seeds(size)) for home in dict.fromkeys(homes)]
-            starts = dict(zip(homes, self._side_by_side(self._finished, lowered), strict=False))
+            lowered = [self._lowered(self._program.start, home, _seeds(size)) for home in distinct]
+            starts = dict(zip(distinct, self._side_by_side(self._finished, lowered), strict=True))
         give_back()
         self.seconds += working_time() - began
         return tuple(starts[home](*share) for home, share in zip(homes, self.place((known, idle), width), strict=True))
@@ -117,10 +118,10 @@ class Lanes:
         advanced = self._side_by_side(one, self.programs(width), state, bounds)
         return tuple(share for share, _ in advanced), self.gather([report for _, report in advanced])
 
-    def score(self, state: Shares, width: int) -> Score:
-        """Judge every lane's champion; the result is on the host."""
+    def examine(self, state: Shares, width: int) -> Score:
+        """Examine every lane's champion; the result is on the host."""
         scores = self._side_by_side(
-            lambda program, share: jax.device_get(program.score(share)), self.programs(width), state
+            lambda program, share: jax.device_get(program.examine(share)), self.programs(width), state
         )
         score: Score = self.gather(scores)
         return score
@@ -173,7 +174,7 @@ class Lanes:
                 for home in homes
                 for program in (
                     self._lowered(self._program.advance, home, (state, until), donate=True),
-                    self._lowered(self._program.score, home, (state,)),
+                    self._lowered(self._program.examine, home, (state,)),
                 )
             ]
             give_back()  # what compiling the kernels has freed

@@ -17,7 +17,7 @@ from evoclaims.kernels import kernel_prng
 from evoclaims.trials.devices import MATMUL_PRECISION
 from evoclaims.trials.jax_options import refuse_changed
 from evoclaims.trials.loop_messages import Scores
-from evoclaims.trials.program import score_every_level
+from evoclaims.trials.program import examine_every_level
 
 
 def examined(task: Task, policy: Callable[[Any], Any], seed: int) -> Scores:
@@ -32,7 +32,7 @@ def examined(task: Task, policy: Callable[[Any], Any], seed: int) -> Scores:
     fitted = _fitted(task, policy)
 
     def score(number: Int[Array, ""]) -> Episode:
-        return score_every_level(task, fitted, kernel_prng(trial_key(number, EVALUATION)))
+        return examine_every_level(task, fitted, kernel_prng(trial_key(number, EVALUATION)))
 
     with jax.default_matmul_precision(MATMUL_PRECISION):
         final: Episode = jax.device_get(jax.jit(score)(np.int32(seed)))

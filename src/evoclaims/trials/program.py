@@ -59,7 +59,7 @@ def climb(ascent: Ascent, success: Float[Array, ""], steps: Int[Array, ""]) -> A
     )
 
 
-def score_every_level(task: Task, policy: PolicyFn, key: PRNGKeyArray) -> Episode:
+def examine_every_level(task: Task, policy: PolicyFn, key: PRNGKeyArray) -> Episode:
     """Examine a policy on each level separately; the leaves of the result have shape [levels].
 
     The key must come from the trial's evaluation stream, which training never draws from.
@@ -183,12 +183,12 @@ class Program:
             diverged=trial.diverged,
         )
 
-    def score(self, trial: TrialState) -> Score:
-        """Judge the trial's champion on every level, with keys that training never sees."""
+    def examine(self, trial: TrialState) -> Score:
+        """Examine the trial's champion on every level, with keys that training never sees."""
         method, task = self.condition.method, self._task(trial)
         policy = method.best(task, trial.method)
         with both_named(method, task):
-            final = score_every_level(task, policy, kernel_prng(trial_key(trial.seed, EVALUATION)))
+            final = examine_every_level(task, policy, kernel_prng(trial_key(trial.seed, EVALUATION)))
             check_scores(task, final)
         return Score(final=final, parameters=policy.parameters, solved_at=trial.ascent.solved_at)
 

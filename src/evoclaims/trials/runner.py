@@ -228,7 +228,7 @@ def _store_ended(run: Run, batch: Batch, report: Report, ended: Sequence[int], a
     header, due = batch.header, [lane for lane in ended if lane in batch.owed]
     timing = _timing(run, header)
     if due:
-        score = allowance.spend(lambda: run.lanes.score(batch.state, len(header.lanes)))
+        score = allowance.spend(lambda: run.lanes.examine(batch.state, len(header.lanes)))
     for lane in due:
         seed = header.lanes[lane]
         assert seed is not None

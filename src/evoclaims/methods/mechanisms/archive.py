@@ -13,7 +13,7 @@ from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 from numpy.typing import NDArray
 
 from evoclaims.envs.base import Episode, Task
-from evoclaims.methods.champion import policy_of
+from evoclaims.methods.flat_champion import policy_of
 from evoclaims.methods.map_elites import MapElites, MapElitesState
 from evoclaims.methods.mechanisms.observed import Observed, Question
 from evoclaims.networks.mlp import Mlp

@@ -16,7 +16,7 @@ from evoclaims.core.pytree import pytree, select
 from evoclaims.envs.base import Episode, Task
 from evoclaims.kernels import take_rows
 from evoclaims.methods.base import Policy, Progress
-from evoclaims.methods.champion import no_episode
+from evoclaims.methods.flat_champion import no_episode
 from evoclaims.methods.neat.capacity import capacities, in_capacity
 from evoclaims.methods.neat.population import (
     Parents,

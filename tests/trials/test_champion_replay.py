@@ -24,7 +24,7 @@ from evoclaims.methods.neat.evolution import Neat
 from evoclaims.methods.neat.settings import Settings, Species
 from evoclaims.methods.ppo import Ppo
 from evoclaims.networks.all_skips import AllSkips
-from evoclaims.trials import champions
+from evoclaims.trials import champion_replay
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.runner import run
 from evoclaims.trials.spec import Budget, Condition
@@ -71,8 +71,8 @@ def test_a_champion_loaded_from_the_store_replays_to_the_same_fitness(name: str,
     store, results = ran(name)
     assert len({result.levels["fitness"] for result in results}) == 3
     for result in results:
-        parameters = champions.load(store, _condition(name), result)
-        replay = champions.replay(_condition(name), result, parameters, cpus)
+        parameters = champion_replay.load(store, _condition(name), result)
+        replay = champion_replay.replay(_condition(name), result, parameters, cpus)
         assert replay.again == {key: result.levels[key] for key in ("success", "fitness")}
         assert (replay.exact, replay.elsewhere) == (True, ())
 
@@ -80,17 +80,17 @@ def test_a_champion_loaded_from_the_store_replays_to_the_same_fitness(name: str,
 def test_a_replay_of_other_parameters_or_of_another_seed_is_not_exact(ran: Any, cpus: list[Any]) -> None:
     store, (result, other, _) = ran("cma_es")
     condition = _condition("cma_es")
-    parameters = champions.load(store, condition, result)
-    assert not champions.replay(condition, result, parameters * np.float32(0.99), cpus).exact
-    assert not champions.replay(condition, replace(result, seed=other.seed), parameters, cpus).exact
+    parameters = champion_replay.load(store, condition, result)
+    assert not champion_replay.replay(condition, result, parameters * np.float32(0.99), cpus).exact
+    assert not champion_replay.replay(condition, replace(result, seed=other.seed), parameters, cpus).exact
 
 
 def test_nan_is_replayed_as_nan(ran: Any, cpus: list[Any]) -> None:
     store, (result, *_) = ran("cma_es")
     condition = _condition("cma_es")
-    broken = np.full_like(champions.load(store, condition, result), np.nan)
+    broken = np.full_like(champion_replay.load(store, condition, result), np.nan)
     nan = replace(result, levels={**result.levels, "fitness": (np.nan, np.nan)})
-    replay = champions.replay(condition, nan, broken, cpus)
+    replay = champion_replay.replay(condition, nan, broken, cpus)
     assert np.isnan(replay.again["fitness"]).all()
     assert replace(replay, again={"fitness": replay.again["fitness"]}).exact
 
@@ -98,7 +98,7 @@ def test_nan_is_replayed_as_nan(ran: Any, cpus: list[Any]) -> None:
 def test_what_differs_between_here_and_where_the_trial_was_made_is_named(ran: Any, cpus: list[Any]) -> None:
     store, (result, *_) = ran("cma_es")
     condition = _condition("cma_es")
-    parameters = champions.load(store, condition, result)
+    parameters = champion_replay.load(store, condition, result)
     versions = {**result.provenance["versions"], "jax": "0.0.1"}
     for provenance, named in (
         ({**result.provenance, "machine": "a mainframe", "versions": versions}, ("machine", "versions")),
@@ -106,7 +106,7 @@ def test_what_differs_between_here_and_where_the_trial_was_made_is_named(ran: An
         ({**result.provenance, "git": None}, ()),
         ({}, ("kind",)),
     ):
-        replay = champions.replay(condition, replace(result, provenance=provenance), parameters, cpus)
+        replay = champion_replay.replay(condition, replace(result, provenance=provenance), parameters, cpus)
         assert replay.elsewhere == named
 
 
@@ -118,10 +118,10 @@ def test_a_champion_whose_file_was_changed_is_told(ran: Any, tmp_path: Path) -> 
     data[len(data) // 2] ^= 1
     path.write_bytes(data)
     with pytest.raises(DamagedFileError, match="it is not the champion that the trial's record names"):
-        champions.load(store, condition, result)
+        champion_replay.load(store, condition, result)
     path.unlink()
     with pytest.raises(DamagedFileError, match="cannot be read"):
-        champions.load(store, condition, result)
+        champion_replay.load(store, condition, result)
 
 
 @pytest.mark.parametrize(
@@ -141,8 +141,8 @@ def test_arrays_that_are_not_the_methods_are_told(arrays: dict[str, Any], cpus: 
     stored = store.get(result.id)
     assert stored is not None
     with pytest.raises(UserError, match="walker on n_parity, seed 0, does not have the arrays .* another version"):
-        champions.load(store, condition, stored)
-    assert champions.load(Store(tmp_path / "one"), condition, result).shape == (4,)
+        champion_replay.load(store, condition, stored)
+    assert champion_replay.load(Store(tmp_path / "one"), condition, result).shape == (4,)
 
 
 def test_a_trial_without_a_champion_says_so(cpus: list[Any], tmp_path: Path) -> None:
@@ -153,4 +153,4 @@ def test_a_trial_without_a_champion_says_so(cpus: list[Any], tmp_path: Path) -> 
     stored = store.get(result.id)
     assert stored is not None
     with pytest.raises(UserError, match="Seed 0 of walker on n_parity has no champion: it is crashed"):
-        champions.load(store, condition, stored)
+        champion_replay.load(store, condition, stored)

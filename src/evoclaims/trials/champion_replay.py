@@ -19,7 +19,7 @@ from evoclaims.kernels import kernel_prng
 from evoclaims.methods.base import Policy
 from evoclaims.trials.devices import MATMUL_PRECISION
 from evoclaims.trials.layout import layout_on
-from evoclaims.trials.program import score_every_level
+from evoclaims.trials.program import examine_every_level
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.result_making import named_leaves, provenance
 from evoclaims.trials.spec import Condition
@@ -72,7 +72,7 @@ def replay(condition: Condition, result: TrialResult, parameters: Any, devices: 
 
     def score(seed: Int[Array, ""], parameters: Any) -> Episode:
         policy = replace(_policy(condition), parameters=parameters)
-        return score_every_level(condition.task, policy, kernel_prng(trial_key(seed, EVALUATION)))
+        return examine_every_level(condition.task, policy, kernel_prng(trial_key(seed, EVALUATION)))
 
     arguments = jax.tree.map(lambda leaf: np.asarray(leaf)[None], (np.int32(result.seed), parameters))
     layout = layout_on(devices[0].platform)
