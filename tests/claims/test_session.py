@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import threading
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,23 +15,33 @@ from evoclaims.claims.claim import Claim, ClaimTest
 from evoclaims.claims.fetching import NotStoredError, RunMissing, StoredOnly
 from evoclaims.claims.session import Session
 from evoclaims.claims.verdict_fixture import VerdictFixture
+from evoclaims.claims.workload import Work, Workload
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.packages import without_flags
 from evoclaims.core.provenance import changing_flags
+from evoclaims.execution.ahead import Ahead
+from evoclaims.execution.host import Host
+from evoclaims.execution.job import Job
+from evoclaims.execution.worker import Ended, WorkOrder
+from evoclaims.execution.workers import Workers
 from evoclaims.judging.design import SEQUENTIAL
 from evoclaims.judging.verdict import Outcome
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.paper import pilots, references
 from evoclaims.paper.archive import Archive
+from evoclaims.paper.cost import Cost
 from evoclaims.paper.reproduction import Reproduction, Variant
+from evoclaims.trials.layout import Layout
 from evoclaims.trials.progress import ignore
-from evoclaims.trials.result import TrialResult
+from evoclaims.trials.result import Status, TrialResult
 from evoclaims.trials.spec import Budget, Condition, TrialSpec
 from evoclaims.trials.store import Store
 from evoclaims.verdicts import history
 from evoclaims.verdicts.history import AcceptedVerdict
 
 Made = Callable[..., TrialResult]
+
+COST = Cost(1.0, 1.0, 12, Layout.ALONE)
 
 
 def _value(condition: Condition, seed: int) -> float:
@@ -343,6 +354,131 @@ def test_trials_for_the_drift_check_run_once_with_the_last_that_claims_read(tmp_
     mode(condition, range(6))
     store.record_path(TrialSpec(condition, 7).id, condition.versions).unlink()
     assert (len(mode(condition, range(6))), len(store.ids())) == (6, 7)
+
+
+def test_trials_for_the_drift_check_count_where_they_ended_and_have_the_versions_of_the_others(
+    session: Session, says: Claim, made: Made
+) -> None:
+    """A run that makes none of them, as on a GPU or after an upgrade under a short limit, finds older ones."""
+    session = _with_more(session, 2)
+    better = _pair(session)[0].condition
+    _committed(session, made, lambda seed: seed / 10)
+    reports = _settled(session, made, says, lambda seed: seed / 10)
+
+    def counted(**kwargs: Any) -> int:
+        for seed in (6, 7):
+            for path in session.store.record_files(TrialSpec(better, seed).id):
+                path.unlink(missing_ok=True)
+            session.store.put(made(better, seed, seed / 10, **(kwargs if seed == 7 else {})), {})
+        return int(earlier_trials.drift(session, reports)[0].rows[0].n_new)
+
+    assert counted() == 8
+    assert counted(versions={"jax": "0.0"}) == 6
+    assert counted(status="timeout") == 6
+
+
+def test_a_claim_whose_trials_are_there_is_judged_where_those_for_the_drift_check_cannot_be_made(
+    tmp_path: Path, session: Session
+) -> None:
+    session = _with_more(session, 2)
+    condition, more = _pair(session)[0].condition, session.reproduction.seeds_for_drift
+    store = Store(tmp_path / "damaged")
+    assert len(RunMissing(store, "cpu", ignore, for_drift=more)(condition, range(6))) == 6
+    for seed, whole in ((7, True), (5, False)):
+        store.record_path(TrialSpec(condition, seed).id, condition.versions).write_text("{")
+        ahead = Ahead(Host(2, ()), WorkOrder(str(store.root), "", "cpu", 0, 0), session.reproduction, store, 1e9, print)
+        ahead._errors[condition.id] = "the store is damaged"
+        for mode in (RunMissing(store, "cpu", ignore, wait=wait, for_drift=more) for wait in (_no_wait, ahead.wait)):
+            if whole:
+                assert [trial.seed for trial in mode(condition, range(6))] == [*range(6)]
+            else:
+                with pytest.raises(UserError, match=r"it is not one whole JSON text|the store is damaged"):
+                    mode(condition, range(6))
+
+
+def _no_wait(condition: Condition, seeds: Sequence[int]) -> None:
+    pass
+
+
+def test_trials_for_the_drift_check_are_asked_of_processes_on_cpus_alone(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a condition whose claim may come to a third look of twelve trials."""
+    session = _with_more(session, 4)
+    condition, paper = _pair(session)[0].condition, session.reproduction
+
+    def ahead(gpus: tuple[str, ...], limit: float) -> tuple[int, ...]:
+        asked: list[Job] = []
+        monkeypatch.setattr(
+            Ahead, "_run", lambda self, runs: asked.extend(job for run in runs for job in run.conditions)
+        )
+        works = {condition.id: Work(("better", "small"), "smoke", "", 0, dict.fromkeys(range(12), ""), COST)}
+        one = Ahead(Host(2, gpus), WorkOrder("", "", "cpu", 0, 0), paper, session.store, limit, print)
+        one.start(Workload("", {"claim": (condition.id,)}, works), {"smoke": range(6)})
+        one.stop()
+        return asked[0].seeds
+
+    assert ahead((), 1e9) == (*range(10),)
+    assert ahead(("0", "1"), 1e9) == (*range(6),)
+    assert ahead((), 60.0) == (*range(6),)
+
+
+@pytest.mark.parametrize(("gpus", "first"), [(("0", "1"), "ahead"), ((), "due now")])
+def test_what_was_not_asked_for_beforehand_waits_for_gpus(
+    session: Session, made: Made, monkeypatch: pytest.MonkeyPatch, gpus: tuple[str, ...], first: str
+) -> None:
+    better, worse = (group.condition for group in _pair(session))
+    here = {"versions": without_flags(worse.versions), "xla_flags": changing_flags()}
+    log, judged = list[str](), threading.Event()
+
+    def run_ahead(ahead: Ahead, runs: object) -> None:
+        judged.wait(0.3 if gpus else 60.0)
+        log.append("ahead")
+
+    def run(workers: Workers, groups: Sequence[Sequence[Job]]) -> Iterator[Ended]:
+        log.append("due now")
+        session.store.put(made(worse, 0, 1.0, **here), {})
+        yield Ended(groups[0][0])
+
+    monkeypatch.setattr(Ahead, "_run", run_ahead)
+    monkeypatch.setattr(Workers, "run", run)
+    order = WorkOrder(str(session.store.root), "", "cpu", 0, 0)
+    ahead = Ahead(Host(2, gpus), order, session.reproduction, session.store, 1e9, print)
+    works = {better.id: Work(("better", "small"), "smoke", "", 0, dict.fromkeys(range(6), ""), COST)}
+    ahead.start(Workload("", {"claim": tuple(works)}, works), {"smoke": range(6)})
+    ahead.wait(worse, [0])
+    judged.set()
+    ahead.stop()
+    assert (log[0], len(log)) == (first, 2)
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_a_trial_that_crashes_in_a_worker_is_run_once_and_its_claim_says_so(
+    session: Session, says: Claim, made: Made, monkeypatch: pytest.MonkeyPatch, known: bool
+) -> None:
+    """Whether it is known beforehand that the claim needs it, or not."""
+    better, ran = _pair(session)[0], list[tuple[int, ...]]()
+    here = {"versions": without_flags(better.condition.versions), "xla_flags": changing_flags()}
+
+    def run(workers: Workers, groups: Sequence[Sequence[Job]]) -> Iterator[Ended]:
+        for job in groups[0]:
+            ran.append(job.seeds)
+            for seed in job.seeds:
+                status: Status = "crashed" if seed == 3 else "done"
+                session.store.put(made(better.condition, seed, 1.0, status, **here), {})
+            yield Ended(job)
+
+    monkeypatch.setattr(Workers, "run", run)
+    order = WorkOrder(str(session.store.root), "", "cpu", 0, 0)
+    ahead = Ahead(Host(2, ()), order, session.reproduction, session.store, 1e9, print)
+    works = {better.condition.id: Work(("better", "small"), "smoke", "", 0, dict.fromkeys(range(6), ""), COST)}
+    ahead.start(Workload("", {"claim": tuple(works)} if known else {}, works if known else {}), {"smoke": range(6)})
+    running = replace(session, fetch=RunMissing(session.store, "cpu", ignore, wait=ahead.wait))
+    for _ in range(2):
+        better = _pair(running)[0]
+        report = running.settle(ClaimTest(says, "smoke", ""), better.solves_every_level.in_most_trials())
+        assert (report.outcome, ran) == ("error", [(*range(6),)])
+        assert "1 of 6 trials of better on small crashed (seed 3)" in report.reason
 
 
 @pytest.mark.parametrize("more", [0, 95])

@@ -55,6 +55,19 @@ def test_plan_counts_the_trials_of_a_third_look_where_a_claim_is_open(evoclaims:
     assert f"{rest}coin on parity." in " ".join(out.split())
 
 
+def test_plan_counts_trials_for_the_drift_check_on_cpus(evoclaims: Evoclaims, project: Project) -> None:
+    paper = project.path / "tiny_paper.py"
+    more = 'Tier(conditions(1), Design.fixed(10), for_drift={("right", "parity"): 20})'
+    paper.write_text(paper.read_text().replace("Tier(conditions(1), Design.fixed(10))", more))
+    assert evoclaims("run", "right")[0] == 0
+    assert evoclaims("reference", "--unknown-revision")[0] == 0
+    path = Path("reference/smoke/right-parity.jsonl")
+    device = {"platform": "gpu", "kind": "NVIDIA Abacus", "count": 1}
+    references.write(path, [replace(t, provenance={"device": device}) for t in references.load(path)])
+    assert re.search(r"^right on parity +10 +20 +80 ", evoclaims("plan")[1], re.MULTILINE)
+    assert re.search(r"^right on parity +10 +0 +0 ", evoclaims("plan", "--like=NVIDIA Abacus")[1], re.MULTILINE)
+
+
 def test_plan_says_which_claim_cannot_be_judged_and_why(evoclaims: Evoclaims, project: Project) -> None:
     project.write(c="verdict(trials('rigth', on='parity').mean_success > 0)")
     status, out, _ = evoclaims("plan")

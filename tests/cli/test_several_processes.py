@@ -186,7 +186,9 @@ def test_a_gpu_where_no_process_starts_costs_no_condition(run: Run, capsys: pyte
 
 def test_where_no_process_starts_every_condition_has_failed(run: Run) -> None:
     ended, _ = run([["a"], ["b", "c"]], [_gpu("0"), _gpu("1")], broken=frozenset({"0", "1"}))
-    assert sorted((one.job.method, one.error) for one in ended) == [(x, "no worker process could start") for x in "abc"]
+    assert sorted((one.job.method, one.error) for one in ended) == [
+        (x, "no worker process could start: status 7") for x in "abc"
+    ]
     assert all(one.untried for one in ended)
 
 

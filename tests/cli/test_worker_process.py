@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -14,7 +16,7 @@ import pytest
 from tiny_project import REPRODUCTION, Evoclaims, Project
 
 from evoclaims.execution.job import Job
-from evoclaims.execution.worker import WorkOrder
+from evoclaims.execution.worker import Ended, WorkOrder
 from evoclaims.execution.workers import Process
 
 SLOW = """
@@ -67,3 +69,47 @@ def test_ctrl_c_while_a_worker_starts_does_not_end_it(project: Project, capfd: p
     process.close()
     assert (process._process.returncode, capfd.readouterr().err) == (0, "")
     assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())  # the command itself still hears it
+
+
+def test_what_a_process_says_that_cannot_open_the_project_is_why_it_ended(
+    project: Project, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is passed on, and read to its end also where nobody can be told: else the process would wait for ever."""
+    paper = project.path / "tiny_paper.py"
+    noise = "\nimport sys\nprint(*range(99_999), sep=chr(10), file=sys.stderr)\nraise RuntimeError('on strike')"
+    paper.write_text(paper.read_text() + noise)
+    with open("/dev/full", "w") as full:
+        monkeypatch.setattr("sys.stderr", full)
+        process = Process(WorkOrder(".evoclaims", "smoke", "cpu", 0, 1), {})
+        watchdog = threading.Timer(60.0, process.stop)
+        watchdog.start()
+        assert not process.is_ready()
+        watchdog.cancel()
+        process.close()
+        with contextlib.suppress(OSError):
+            full.close()
+    assert process.why().startswith("The module 'tiny_paper', which [tool.evoclaims] names, does not import: Runtime")
+    assert "on strike" in process.why()
+
+
+READER = """    def init(self, key, task):
+        import subprocess
+        assert subprocess.run(["cat"], stdout=subprocess.PIPE, check=True).stdout == b""
+        return jnp.where"""
+
+
+def test_a_method_that_reads_its_input_takes_no_condition_from_the_worker(project: Project) -> None:
+    """Programs that it starts may, such as ffmpeg; they would wait for ever."""
+    paper = project.path / "tiny_paper.py"
+    begun = "    def init(self, key, task):\n        return jnp.where"
+    assert begun in paper.read_text()
+    paper.write_text(paper.read_text().replace(begun, READER))
+    process = Process(WorkOrder(".evoclaims", "smoke", "cpu", 0, 1), {})
+    watchdog = threading.Timer(60.0, process.stop)
+    watchdog.start()
+    assert process.is_ready()
+    for method in ("coin", "right"):
+        job = Job("", method, "parity")
+        assert process.run(job, lambda text: None) == Ended(job)
+    watchdog.cancel()
+    process.close()

@@ -46,6 +46,12 @@ def test_two_processes_give_the_verdicts_of_one(project: Any) -> None:
     assert [line for line in again.outlines if " in small (§1) " in line] == rows[0]
 
 
+def test_processes_are_asked_for_nothing_where_all_trials_are_there(project: Any) -> None:
+    project.write(a="supported", b="refuted")
+    result = project.run("--claims-processes=2")
+    assert result.parseoutcomes() == {"supported": 1, "refuted": 1, "deselected": 2}
+
+
 def test_both_tiers_and_a_variant_run_in_processes(project: Any) -> None:
     project.write(a="supported")
     result = project.run("--claims-processes=2", "-m", "smoke or full", "--claims-variant=traded", own_store=True)

@@ -10,7 +10,11 @@ from typing import Any
 
 import pytest
 
+from evoclaims.claims.workload import Watching, Workload
 from evoclaims.cli import main
+from evoclaims.core.errors import UserError
+from evoclaims.execution.ahead import Ahead
+from evoclaims.plugin.progress import ProgressLine
 
 CLAIMS = """
 @says('coin')
@@ -70,6 +74,30 @@ def test_a_claim_that_stops_a_run_with_x_and_last_failed_are_what_they_are(proje
     assert order(result) == ["b"]
     result = project.run("-v", "--lf", own_store=True)
     assert order(result) == ["b"]
+
+
+@pytest.mark.parametrize(("gpus", "trials"), [((), 30), (("0", "1"), 10)])
+def test_trials_for_the_drift_check_are_counted_where_they_are_made(
+    project: Any, monkeypatch: pytest.MonkeyPatch, gpus: tuple[str, ...], trials: int
+) -> None:
+    """On GPUs they are not; nothing is run here."""
+    project.write(a="supported")
+    paper = project.path / "tiny_paper.py"
+    more = 'Tier(conditions(1), Design.fixed(10), for_drift={("right", "parity"): 20})'
+    paper.write_text(paper.read_text().replace("Tier(conditions(1), Design.fixed(10))", more))
+    seen: list[int] = []
+
+    def begin(line: ProgressLine, load: Workload, workers: int, tick: bool) -> None:
+        seen.append(Watching(load, workers).look().trials)
+        raise UserError("no more is needed")
+
+    monkeypatch.setattr("evoclaims.trials.gpus.gpus", lambda device: gpus)
+    monkeypatch.setattr("evoclaims.trials.devices.keep_off_gpus", lambda: None)
+    monkeypatch.setattr(Ahead, "_run", lambda ahead, runs: None)
+    monkeypatch.setattr(ProgressLine, "begin", begin)
+    for processes in ("2", "auto") if gpus else ("1", "2"):
+        project.run(f"--claims-processes={processes}", own_store=True)
+    assert seen == [trials] * 2
 
 
 def test_a_log_without_a_terminal_has_one_line_about_the_progress_and_none_when_quiet(project: Any) -> None:

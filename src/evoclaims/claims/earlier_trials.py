@@ -34,7 +34,8 @@ NAMES: Final = (("method", "name"), ("task", "name"), ("imported", "file"))
 class _Used:
     """A condition that a tier's claims use: the ids of its trials, and the seeds that were run again.
 
-    `for_drift` are ids of trials that no claim reads. They count if all are there: those that end first are no sample.
+    `for_drift` are ids of trials that no claim reads. They count if all are there, ended and of the versions of the
+    others: those that end first are no sample.
     """
 
     tier: str
@@ -126,8 +127,14 @@ def _trials(session: Session, used: _Used) -> list[TrialResult]:
         found = (get(trial, used.condition.versions) for trial in sorted(trials))
         return [trial for trial in found if trial is not None]
 
-    own, more = stored(used.ids), stored(used.for_drift - used.ids)
-    return [*own, *more] if own and len(more) == len(used.for_drift - used.ids) else own
+    own, more, packages = stored(used.ids), used.for_drift - used.ids, used.condition.packages
+    versions = [recorded(trial.provenance, packages) for trial in own]
+    alike = [
+        trial
+        for trial in stored(more)  # a run that does not make them may find those of other versions
+        if trial.status != "timeout" and recorded(trial.provenance, packages) in versions
+    ]
+    return [*own, *alike] if own and len(alike) == len(more) else own
 
 
 def new_histories(

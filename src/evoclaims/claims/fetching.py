@@ -27,6 +27,27 @@ class NotStoredError(Exception):
         self.condition = condition
 
 
+def more_for_drift(
+    known: Mapping[str, range], condition: str, seeds: Sequence[int], time_limit: float, platform: str
+) -> Sequence[int]:
+    """Return the seeds for the drift check that follow on `seeds`, the last that claims read.
+
+    None under a time limit of minutes, which they would use up, and none but on CPUs, where a trial has the same bits
+    in any batch.
+
+    Args:
+        known: these seeds, by the condition's id.
+        condition: its id.
+        seeds: that are asked for.
+        time_limit: seconds that a batch of trials may take.
+        platform: where they will run: "cpu" or "gpu".
+    """
+    more = known.get(condition, range(0))
+    if not more or more[0] - 1 not in seeds or time_limit < 3600 or platform != "cpu":
+        return ()
+    return [seed for seed in more if seed not in seeds]
+
+
 @dataclass(frozen=True)
 class RunMissing:
     """Run what the store lacks.
@@ -71,33 +92,33 @@ class RunMissing:
 
     def __call__(self, condition: Condition, seeds: Sequence[int]) -> Sequence[TrialResult]:
         """Return one trial per seed."""
-        chosen = devices.choose(self.device)
         self.note_outdated(condition, seeds)
         more = () if condition.id in self._made else self.more(condition, seeds)
-        self.wait(condition, [*seeds, *more])
-        results = run(
+        if more:
+            self._made.add(condition.id)
+            try:
+                return [result for result in self._results(condition, [*seeds, *more]) if result.seed not in more]
+            except UserError:  # in a store that cannot be written, say: the claims' own trials may all be there
+                pass
+        return self._results(condition, seeds)
+
+    def _results(self, condition: Condition, seeds: Sequence[int]) -> Sequence[TrialResult]:
+        chosen = devices.choose(self.device)
+        self.wait(condition, seeds)
+        return run(
             condition,
-            [*seeds, *more],
+            seeds,
             self.store,
             chosen,
             self.watch,
             time_limit=self.time_limit,
             any_version=self.any_version,
         )
-        if more:
-            self._made.add(condition.id)
-        return [result for result in results if result.seed not in more]
 
     def more(self, condition: Condition, seeds: Sequence[int]) -> Sequence[int]:
-        """Return the seeds for the drift check that follow on `seeds`, the last that claims read.
-
-        None under a time limit of minutes, which they would use up, and none but on CPUs, where a trial has the same
-        bits in any batch.
-        """
-        more = self.for_drift.get(condition.id, range(0))
-        if not more or more[0] - 1 not in seeds or self.time_limit < 3600:
-            return ()
-        return [seed for seed in more if seed not in seeds] if devices.choose(self.device)[0].platform == "cpu" else ()
+        """Return the seeds for the drift check that are made with `seeds` (see `more_for_drift`)."""
+        platform = devices.choose(self.device)[0].platform
+        return more_for_drift(self.for_drift, condition.id, seeds, self.time_limit, platform)
 
     def note_outdated(self, condition: Condition, seeds: Sequence[int]) -> None:
         """Note which trials are about to be run again because of their versions."""

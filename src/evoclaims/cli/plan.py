@@ -11,7 +11,7 @@ from typing import Final
 
 from rich.table import Table
 
-from evoclaims.claims.fetching import NotStoredError, RunMissing, StoredOnly
+from evoclaims.claims.fetching import NotStoredError, StoredOnly, more_for_drift
 from evoclaims.cli.project import open_project
 from evoclaims.cli.terminal import styled
 from evoclaims.core.errors import UserError, in_one_line
@@ -25,7 +25,6 @@ from evoclaims.report.console import PlainSpokenConsole, plain_table
 from evoclaims.report.live_line import duration
 from evoclaims.trials import devices
 from evoclaims.trials.imported import where_from
-from evoclaims.trials.progress import ignore
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import DamagedFileError
@@ -76,11 +75,10 @@ def main(options: argparse.Namespace) -> int:
     if options.like:
         platform = "cpu" if options.like == "cpu" else "gpu"
     limit = project.config.seconds(None)
-    fetch = RunMissing(store, "cpu", ignore, limit, for_drift=reproduction.seeds_for_drift)
     wanted: dict[Names, Wanted] = {}
     for names in used:
         condition, seeds = tier.condition(*names), tier.design.seeds(counts[names])
-        for_drift = fetch.more(condition, seeds) if platform == "cpu" else ()
+        for_drift = more_for_drift(reproduction.seeds_for_drift, condition.id, seeds, limit, platform)
         wanted[names] = Wanted(names, condition, [*seeds, *for_drift])
     estimator = Estimator(store, reproduction, options.tier, platform, options.like or "", limit)
     owed = estimator.owed(wanted)

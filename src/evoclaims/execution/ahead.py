@@ -6,6 +6,7 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from evoclaims.claims.fetching import more_for_drift
 from evoclaims.claims.workload import Workload, soonest_first
 from evoclaims.core.errors import UserError
 from evoclaims.execution.host import Host
@@ -15,6 +16,7 @@ from evoclaims.execution.workers import Seat, StoppedError, Workers, in_queue, s
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.trials import devices, gpus
 from evoclaims.trials.batches import StoredTrials
+from evoclaims.trials.failed import remember
 from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import Store
 
@@ -94,7 +96,7 @@ class Ahead:
         """
         claims = soonest_first(load)
         lacking = (claim for claim in claims if any(load.conditions[name].missing for name in load.claims[claim]))
-        soonest = load.claims[next(lacking, "")] if load.claims else ()
+        soonest = load.claims.get(next(lacking, ""), ())
         runs, ends = list[TierRun](), dict[str, float]()
         for tier in seeds:
             run = self._planned(load, tier, seeds[tier], soonest)
@@ -118,12 +120,17 @@ class Ahead:
             self._ended[condition.id].wait()
         if self._broken is not None:
             raise self._broken
-        error = self._errors.get(condition.id, "")
         stored = StoredTrials(self.store, condition, self.order.any_version, self.limit)
-        if not error and (missing := stored.missing(seeds)):
+        if not (missing := stored.missing(seeds)):
+            return
+        error = self._errors.get(condition.id, "")
+        if not error:
             error = self._run_now(condition, missing).error
             if not error and stored.missing(seeds):  # this process must not run them: it may be kept off GPUs
-                error = "its trials were run, and are not in the store"
+                error = (
+                    "worker processes have run other trials than the claim needs: the project was edited after this "
+                    "run had begun, or its settings differ from process to process; run it again"
+                )
         if error:
             raise UserError(error)
 
@@ -139,11 +146,9 @@ class Ahead:
     def _planned(self, load: Workload, tier: str, seeds: Sequence[int], soonest: Sequence[str]) -> TierRun:
         """Return what is to be run of a tier: first what the soonest claim needs, then the longest."""
         works = {name: work for name, work in load.conditions.items() if work.tier == tier}
-        more = self.reproduction.seeds_for_drift
-        asked = {
-            name: tuple(seed for seed in work.missing if seed in seeds or seed in more.get(name, ()))
-            for name, work in works.items()
-        }
+        known, platform = self.reproduction.seeds_for_drift, self.platform
+        due = {name: {*seeds, *more_for_drift(known, name, seeds, self.limit, platform)} for name in works}
+        asked = {name: tuple(seed for seed in work.missing if seed in due[name]) for name, work in works.items()}
         jobs = {Job("", *works[name].names, missing): name for name, missing in asked.items() if missing}
         batches = [MissingBatch(job, job.seeds, works[name].cost) for job, name in jobs.items()]
         batches.sort(key=lambda batch: -batch.cost.seconds())
@@ -159,7 +164,8 @@ class Ahead:
         try:
             for run in runs:
                 for ended in self._started(run.order, run.seats).run(run.groups):
-                    name = run.conditions[ended.job]
+                    name, tier = run.conditions[ended.job], self.reproduction.tier(run.order.tier, self.order.variant)
+                    self._note_crashes(tier.condition(*ended.job.names), ended.job.seeds)
                     self._errors[name] = ended.error
                     self._ended[name].set()
         except StoppedError:
@@ -168,6 +174,12 @@ class Ahead:
             self._broken = error
         for event in self._ended.values():
             event.set()
+
+    def _note_crashes(self, condition: Condition, seeds: Sequence[int]) -> None:
+        """Take trials that have crashed in a worker for this run's own: it does not begin them again."""
+        for result in StoredTrials(self.store, condition, self.order.any_version, self.limit).sound(seeds):
+            if result.status == "crashed":
+                remember(result)
 
     def _started(self, order: WorkOrder, seats: Sequence[Seat]) -> Workers:
         with self._lock:
@@ -181,8 +193,11 @@ class Ahead:
         for tier in self.reproduction.tiers:
             for names, one in self.reproduction.tier(tier, self.order.variant).conditions.items():
                 if one.id == condition.id:
+                    if self.host.gpus and self._thread is not None:
+                        self._thread.join()  # whose processes have these GPUs' memory
                     seat = Seat(gpus.only(self.host.gpus) if self.host.gpus else {})
                     workers = Workers(replace(self.order, tier=tier), [seat], lambda text: None, self.warn)
                     (ended,) = workers.run([[Job("", *names, tuple(seeds))]])
+                    self._note_crashes(one, seeds)
                     return ended
         raise UserError(f"{condition.label} is no condition of the paper, so that no process can run it.")

@@ -15,7 +15,7 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import IO, Any, Final
 
 import msgspec
 
@@ -153,20 +153,22 @@ def _named(line: LiveLine, job: Job) -> Callable[[RunProgress], None]:
 def main() -> int:
     """Run what standard input asks for; 2 where the project cannot be opened."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the command that has started this process ends it
-    replies = os.fdopen(os.dup(1), "wb", buffering=0)
+    orders, replies = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb", buffering=0)
     os.dup2(2, 1)  # what methods and tasks print is no reply
+    with open(os.devnull, "rb") as nothing:
+        os.dup2(nothing.fileno(), 0)  # and no order is for programs that they start
 
     def reply(one: Reply) -> None:
         replies.write(msgspec.json.encode(one) + b"\n")
 
-    order = msgspec.json.decode(sys.stdin.buffer.readline(), type=WorkOrder)
+    order = msgspec.json.decode(orders.readline(), type=WorkOrder)
     try:
         opened = Opened.here(order.storage)
     except UserError as error:
         print(error, file=sys.stderr)
         return USER_ERROR
     asked: queue.SimpleQueue[Job] = queue.SimpleQueue()
-    threading.Thread(target=_read, args=(asked,), daemon=True).start()
+    threading.Thread(target=_read, args=(orders, asked), daemon=True).start()
     reply(Told())
     line = LiveLine(lambda text: reply(Told(text.strip())), None, log_seconds=TOLD_SECONDS)
     for ended in run_jobs(opened, order, iter(asked.get, None), line):
@@ -174,13 +176,13 @@ def main() -> int:
     return 0
 
 
-def _read(asked: Any) -> None:
+def _read(orders: IO[bytes], asked: Any) -> None:
     """Pass conditions on as they are asked for, and end the process with its input.
 
     The command closes it when nothing is left to run, or has died: what runs then goes on from its checkpoint when it
     is asked for again.
     """
-    for text in sys.stdin.buffer:
+    for text in orders:
         asked.put(msgspec.json.decode(text, type=Job))
     os._exit(0)
 

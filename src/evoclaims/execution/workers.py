@@ -18,7 +18,7 @@ import msgspec
 
 from evoclaims.execution.host import AUTO, Host
 from evoclaims.execution.job import Job, MissingBatch, sharing_programs
-from evoclaims.execution.worker import Ended, Reply, Told, WorkOrder
+from evoclaims.execution.worker import USER_ERROR, Ended, Reply, Told, WorkOrder
 from evoclaims.paper.reproduction import Conditions
 from evoclaims.trials import devices, gpus
 
@@ -44,6 +44,7 @@ class Process:
         process: Any = self._process
         pipes: tuple[IO[bytes], ...] = process.stdin, process.stdout, process.stderr
         self._input, self._output, self._error_output = pipes
+        self._said = ""
         self._errors = threading.Thread(target=self._pass_errors_on, daemon=True)
         self._errors.start()
         self._ask(order)
@@ -60,8 +61,11 @@ class Process:
         return reply
 
     def why(self) -> str:
-        """Return how it has ended, such as "status 7"."""
+        """Return how it has ended, such as "status 7"; or what it has said, where the project cannot be opened."""
         status = self._process.wait()
+        self._errors.join()
+        if status == USER_ERROR and self._said:
+            return self._said.rstrip(".")
         if status == -signal.SIGKILL:
             return "SIGKILL: the system sends that where memory runs out"
         return signal.Signals(-status).name if -status in set(signal.Signals) else f"status {status}"
@@ -95,7 +99,10 @@ class Process:
 
     def _pass_errors_on(self) -> None:
         for line in self._error_output:
-            print(line.decode(errors="replace"), end="", file=sys.stderr, flush=True)
+            text = line.decode(errors="replace")
+            self._said = text.strip() or self._said
+            with contextlib.suppress(OSError, ValueError):  # no room or no reader: the process must not wait for either
+                print(text, end="", file=sys.stderr, flush=True)
 
 
 ATTEMPTS: Final = 3
@@ -161,6 +168,7 @@ class Workers:
         self._processes: set[Process] = set()
         self._threads: list[threading.Thread] = []
         self._stopping = False
+        self._why = ""  # the last process that did not start has ended
         self._ended: queue.SimpleQueue[Ended | BaseException] = queue.SimpleQueue()
 
     def run(self, groups: Sequence[Sequence[Job]]) -> Iterator[Ended]:
@@ -205,7 +213,7 @@ class Workers:
                 self._taken -= 1
                 lost = [] if self._taken else list(self._left)
             for job in (job for group in lost for job in group):
-                self._ended.put(Ended(job, "no worker process could start", untried=True))
+                self._ended.put(Ended(job, f"no worker process could start: {self._why}", untried=True))
         except BaseException as error:
             self._ended.put(error)
 
@@ -259,7 +267,8 @@ class Workers:
             return process
         self._dismiss(process)
         if not self._stopping:
-            self._warn(f"a worker process did not start: {process.why()}.")
+            self._why = process.why()
+            self._warn(f"a worker process did not start: {self._why}.")
         return None
 
     def _run(self, process: Process, group: tuple[Job, ...]) -> tuple[Job, ...]:

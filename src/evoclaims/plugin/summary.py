@@ -129,7 +129,7 @@ class Summary:
         try:
             yield
         except UserError as error:
-            self._troubles.append(str(error))
+            self.report_trouble(str(error))
 
     def _compare_with_accepted(self) -> None:
         """Compare the verdicts with the last accepted ones, which are for the protocol itself, not for a variant."""
