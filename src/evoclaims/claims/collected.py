@@ -1,4 +1,4 @@
-"""A claim's test called once without trials: what it passes to `verdict`, and which trials it asks for."""
+"""A claim's test called once for a command: what it passes to `verdict`, and which trials it asks for; none is run."""
 
 from __future__ import annotations
 

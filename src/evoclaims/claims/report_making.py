@@ -10,10 +10,9 @@ from evoclaims.claims.claim import ClaimTest, Expectation
 from evoclaims.claims.fetching import NotStoredError
 from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UserError, in_one_line
-from evoclaims.judging import judge as judging
 from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.design import Design
-from evoclaims.judging.judge import Fetch, attainability, decide, fingerprint
+from evoclaims.judging.judge import Fetch, attainability, decide, fetch_from, fingerprint, judge
 from evoclaims.judging.power import Draws
 from evoclaims.judging.verdict import Outcome, Verdict
 from evoclaims.paper import pilots
@@ -37,14 +36,14 @@ class Reading:
     since: str
 
 
-def judge(
+def report_of(
     test: ClaimTest,
     assertion: Assertion,
     design: Design,
     trials: Fetch,
     again: Mapping[str, Collection[int]] | None = None,
 ) -> ClaimReport:
-    """Judge a claim's assertion; trials that may not be run make the verdict "not run".
+    """Have a claim's assertion judged; trials that may not be run make the verdict "not run".
 
     Args:
         test: the claim, its tier and case.
@@ -54,7 +53,7 @@ def judge(
         again: seeds that were run again because of their versions, by the condition's id; read after judging.
     """
     try:
-        verdict = judging.judge(assertion, design, trials, claim=test.name, tier=test.tier)
+        verdict = judge(assertion, design, trials, claim=test.name, tier=test.tier)
     except NotStoredError as error:
         of = next((f"{one.label}: " for one in assertion.sources() if one.fingerprint == error.condition), "")
         return without_trials(test, assertion, design, f"{of}{error}")
@@ -65,7 +64,7 @@ def without_trials(test: ClaimTest, assertion: Assertion, design: Design, reason
     """Return the report of a claim that is not judged: "not run", with what is fixed beforehand."""
     mark = fingerprint(assertion, design, claim=test.name, tier=test.tier)
     verdict = Verdict(Outcome.NOT_RUN, reason, assertion.describe(), mark)
-    return _report(test, assertion, design, verdict, judging.fetch_from, {})
+    return _report(test, assertion, design, verdict, fetch_from, {})
 
 
 def unjudged(test: ClaimTest, outcome: Outcome, reason: str, *, has_test: bool = True) -> ClaimReport:

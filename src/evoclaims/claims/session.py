@@ -17,8 +17,8 @@ from evoclaims.claims.report_making import (
     chance_of_inconclusive,
     crash_shown_by,
     expecting,
-    judge,
     read_as,
+    report_of,
     without_trials,
 )
 from evoclaims.core.errors import UserError
@@ -112,7 +112,7 @@ class Session:
         design, claim = self.design(test.tier, third_look=test.third_look), test.claim
         if self.leaves(test.tier, assertion):
             return without_trials(test, assertion, design, f"the variant {self.variant} changes none of its trials")
-        report = judge(test, assertion, design, self.trials_of, self.again)
+        report = report_of(test, assertion, design, self.trials_of, self.again)
         report = replace(report, satisfied_by=self._satisfied_by(report, assertion, design))
         if self.variant:
             return report
