@@ -190,6 +190,6 @@ def test_the_engine_runs_a_mutant_as_any_other_condition(name: str) -> None:
 
     def whole(seed: Any) -> Any:
         trial = program.start(seed, jnp.zeros((), bool))
-        return program.score(program.advance(trial, jnp.int32(3))[0]).final.success
+        return program.examine(program.advance(trial, jnp.int32(3))[0]).final.success
 
     assert jax.eval_shape(whole, jnp.int32(0)).shape == (PARITY.levels,)

@@ -50,7 +50,7 @@ def small_memory(monkeypatch: pytest.MonkeyPatch) -> Small:
             ["5 trials at once: on with 3", "3 trials at once: on with 2", "2 trials at once: on with 1"],
         ),
         ("advance", 3, 2, ["trials at once: on with"]),
-        ("score", 2, 0, ["trials at once: on with"]),
+        ("examine", 2, 0, ["trials at once: on with"]),
     ],
 )
 def test_trials_are_the_same_to_the_bit_whatever_fits_into_memory(
