@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from evoclaims.judging.design import FIXED_10, SEQUENTIAL, Design, Look
+from evoclaims.judging.design import FIXED_10, SEQUENTIAL, THREE_LOOKS, Design, Look
 from evoclaims.judging.judge import attainability, judge, needed_trials
 from evoclaims.judging.measure import Event
 from evoclaims.judging.verdict import Outcome
@@ -195,9 +195,9 @@ def test_a_verdict_says_which_trials_took_the_worst_rank_and_why(source) -> None
     assert judge(source("a", HIGH).score() > source("b", LOW).score(), FIXED_10).without_result == ""
 
 
-def _with_champions(source, label, champions, curves=((1.0,),)):  # type: ignore[no-untyped-def]
-    """Return a source of ten trials with these champions and training curves, each in turn."""
-    made = source(label, [1.0] * 10)
+def _with_champions(source, label, champions, curves=((1.0,),), values=(1.0,) * 10):  # type: ignore[no-untyped-def]
+    """Return a source of trials with these champions and training curves, each in turn."""
+    made = source(label, list(values))
     for seed, trial in made.trials.items():
         curve = curves[seed % len(curves)]
         made.trials[seed] = replace(trial, champion=champions[seed % len(champions)], curves={"fitness": curve})
@@ -298,6 +298,16 @@ def test_a_second_look_goes_on_behind_copies_in_the_first(source) -> None:
     verdict = judge(a.solved().in_most_trials(0.5), replace(FIXED_10, looks=(Look(5, 0.01), Look(10, 0.04))))
     assert (verdict.outcome, verdict.n) == (Outcome.SUPPORTED, 10)
     assert "n = 9 instead of 10" in verdict.reason
+
+
+def test_what_is_smaller_than_claimed_is_not_saved_by_copies_in_a_later_look(source) -> None:
+    order = [0, 9, 1, 8, 2, 7, 3, 6, 4, 5]
+    champions = [str(seed) for seed in range(29)]
+    a = _with_champions(source, "a", [*champions, champions[-1]], [(0.5,)], [*order, *range(100, 120)])
+    b = source("b", [*(2.5 + one for one in order), *range(-100, -120, -1)])
+    verdict = judge(a.score() > b.score(), Design(THREE_LOOKS))
+    assert (verdict.outcome, verdict.n) == (Outcome.SMALLER, 10)
+    assert verdict.reason.startswith("more trials do not refute it: of n = 10, p = ")
 
 
 def test_copies_and_a_table_too_short_for_the_next_look_are_each_a_clause(source) -> None:

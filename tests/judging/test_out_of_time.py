@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from dataclasses import replace
 
 import pytest
@@ -14,6 +15,7 @@ SUPPORTED, REFUTED, INCONCLUSIVE = Outcome.SUPPORTED, Outcome.REFUTED, Outcome.I
 HIGH = [float(i) + 20 for i in range(10)]
 LOW = [float(i) for i in range(10)]
 NEVER = ["timeout"] * 10
+AT_4 = Design.fixed(10, 0.04)
 
 
 def claims(a, b):  # type: ignore[no-untyped-def]
@@ -60,6 +62,34 @@ def test_what_the_others_show_is_decided_whatever_they_would_have_been(source) -
     assert judge(source("a", [0.0] * 8 + ["timeout"] * 2).solved().in_most_trials(), FIXED_10).outcome is REFUTED
     assert judge(source("a", [0.0, *["timeout"] * 9]).solved().in_every_trial(), FIXED_10).outcome is REFUTED
     assert judge(source("a", ["timeout", *HIGH[1:]]).score() > 5, FIXED_10).outcome is SUPPORTED
+
+
+def test_what_is_smaller_than_claimed_may_be_refuted_by_their_results(source) -> None:
+    b = [3.5 + one for one in range(9)]
+    ends = [
+        judge(source("a", LOW).score() > source("b", [*b, x]).score(), AT_4).outcome for x in (-9.0, 99.0, "timeout")
+    ]
+    assert ends == [Outcome.SMALLER, REFUTED, INCONCLUSIVE]
+
+
+@pytest.mark.parametrize("better", [1.3, 1.0])
+def test_a_decision_beside_copies_is_that_of_every_result(source, better: float) -> None:
+    draw, decided = random.Random(1), 0
+    for _ in range(300):
+        a, b = [draw.gauss(better, 1) for _ in range(10)], [draw.gauss(0, 1) for _ in range(9)]
+        a[1] = a[0]
+
+        def ends(last: object, a: list[float] = a, b: list[float] = b) -> Outcome:
+            one = source("a", a)
+            for seed in (0, 1):
+                one.trials[seed] = replace(one.trials[seed], champion="c" * 64, curves={"fitness": (0.857,)})
+            return judge(one.score() > source("b", [*b, last]).score(), AT_4).outcome
+
+        outcome = ends("timeout")
+        if outcome is not INCONCLUSIVE:
+            decided += 1
+            assert {ends(99.0), ends(-99.0)} == {outcome}
+    assert decided > 5
 
 
 def test_copies_beside_them_decide_nothing_either(source) -> None:

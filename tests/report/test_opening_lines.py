@@ -70,14 +70,16 @@ def test_findings_count_sentences_whose_cases_end_alike_at_the_papers_tier(fille
         *one("T4", bad),
         *one("T5", unrun),
         replace(one("T6", good)[0], asserts="T1 1"),  # the same result as T1[1], which decides it
+        replace(one("T7", good)[0], satisfied_by=("no action",)),
     ]
     said = {"T3[1]": "a second sentence of one claim"}
     page = filled.page(*reports, *one("C1", good, where="control"), *one("T5", good, tier="smoke"), sentences=said)
     found = findings(page, opening_lines(page))
     assert [(one.says, [line.claim for line in one.lines]) for one in found] == [
-        ("2 of 4 sentences (full): supported in every case", ["T1", "T2"]),
-        ("1 of 4 sentences (full): refuted in every case", ["T4"]),
-        ("1 of 4 sentences (full): cases end differently", ["T3"]),
+        ("1 of 5 sentences (full): supported in every case", ["T1"]),
+        ("1 of 5 sentences (full): supported but vacuous in every case", ["T7"]),
+        ("1 of 5 sentences (full): refuted in every case", ["T4"]),
+        ("2 of 5 sentences (full): cases end differently", ["T2", "T3"]),
     ]
     only = filled.page(*one("T5", good, tier="smoke"))
     (finding,) = findings(only, opening_lines(only))

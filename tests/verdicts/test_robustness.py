@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from hand_made_verdicts import report
 
-from evoclaims.judging.verdict import Outcome
+from evoclaims.judging.verdict import Outcome, Verdict
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.transitions import matrix
 
@@ -42,3 +44,17 @@ def test_a_claim_hangs_on_a_variant_where_both_have_run_and_their_verdicts_diffe
 
 def test_tiers_are_kept_apart() -> None:
     assert matrix(PLAIN[:1], {"x": [_report("A", Outcome.REFUTED, "x", tier="full")]}) == ()
+
+
+def test_a_variant_that_is_inconclusive_with_fewer_trials_says_nothing_of_the_detail() -> None:
+    """The protocol itself was inconclusive at ten trials, before thirty decided."""
+
+    def judged(outcome: Outcome, n: int) -> ClaimReport:
+        report = _report("A", outcome)
+        return replace(report, verdict=Verdict(outcome, "", "", "f", n=n))
+
+    undecided, refuted = judged(Outcome.INCONCLUSIVE, 10), judged(Outcome.REFUTED, 10)
+    (row,) = matrix([judged(Outcome.SUPPORTED, 30)], {"x": [undecided], "y": [refuted]})
+    assert (row.hangs_on, row.fewer) == (("y",), {"x"})
+    (row,) = matrix([judged(Outcome.SUPPORTED, 10)], {"x": [undecided]})
+    assert row.hangs_on == ("x",)

@@ -214,7 +214,10 @@ def _refutations(project: Project, words: list[str], *_: str) -> str:
     refuted = [row for row in rows if row.plain is Outcome.REFUTED and row.hangs_on]
     others = [one for one in Outcome if any(row.outcomes[name] is one for row in refuted for name in row.hangs_on)]
     cells = {
-        name: [", ".join(row.claim for row in refuted if row.outcomes.get(name) is other) for other in others]
+        name: [
+            ", ".join(row.claim for row in refuted if name in row.hangs_on and row.outcomes[name] is other)
+            for other in others
+        ]
         for name in variants
     }
     head = f"{plural(len(refuted), 'refuted case')} of the {_tier(project, words)} tier end otherwise under a variant:"

@@ -132,12 +132,13 @@ def decide(assertion: Assertion, design: Design, fetch: Fetch = fetch_from) -> E
     Raises:
         Exception: whatever a source raises when it is asked for trials.
     """
-    looks, ending, smaller = assertion.looks(design), None, None
+    looks, ending, smaller, later = assertion.looks(design), None, None, False
     for index, look in enumerate(looks):
         if not _decidable(assertion.attainable(look.n, design), look.alpha):
             continue
         if short := _shortage(assertion, look, design):
-            return smaller or (ending and replace(ending, note=f"{ending.note}{short}; "))
+            ending = ending and replace(ending, note=f"{ending.note}{short}; ")
+            break
         trials = {source.fingerprint: fetch(source, design.seeds(look.n)) for source in assertion.sources()}
         crashed = _crashed(assertion, trials)
         if crashed:
@@ -149,25 +150,27 @@ def decide(assertion: Assertion, design: Design, fetch: Fetch = fetch_from) -> E
             return Ending(Outcome.INCONCLUSIVE, look, trials, None, _all_copies(found.alone, look.n))
         try:
             if found.sentence:
-                ending = _with_any_result(_counted_once(assertion, design, look, trials, found), assertion, design)
-                if ending.outcome is not Outcome.INCONCLUSIVE:
-                    return ending
-                continue  # what later trials could change is not bounded: these may be copies, too
-            finding = assertion.find(trials, design, look.alpha)
+                ending = _counted_once(assertion, design, look, trials, found)
+            else:
+                finding = assertion.find(trials, design, look.alpha)
+                ending = Ending(finding.p.outcome(look.alpha), look, trials, finding)
         except UnreadableTrialError as error:
             return Ending(Outcome.ERROR, look, trials, None, str(error))
-        outcome, note = finding.p.outcome(look.alpha), ""
-        known = _in_time(trials)
-        doubt = _doubt(assertion, outcome, look, design, known) if known != trials else ""
-        if doubt:
-            outcome, doubt = Outcome.INCONCLUSIVE, f"{_ended(assertion, trials, 'timeout')}; {doubt}"
-        if outcome is Outcome.INCONCLUSIVE:
-            outcome, note = _settled(assertion, known, looks[index + 1 :], design) or (outcome, note)
-        ending = Ending(outcome, look, trials, finding, note, doubt=doubt)
-        if outcome is Outcome.SMALLER and look is not looks[-1]:  # a later look may refute it, and cannot save it
-            smaller = smaller or replace(ending, note=f"more trials do not refute it: of n = {look.n}, ")
-        elif outcome is Outcome.REFUTED or (smaller is None and (outcome is not Outcome.INCONCLUSIVE or note)):
+        ending, settled = _with_any_result(ending, look, trials, assertion, design), None
+        if ending.outcome is Outcome.INCONCLUSIVE and not found.sentence:  # later trials may be copies, too
+            settled = _settled(assertion, _in_time(trials), looks[index + 1 :], design)
+            if settled:
+                ending = replace(ending, outcome=settled[0], note=settled[1])
+        later = smaller is not None
+        if ending.outcome is Outcome.SMALLER and look is not looks[-1]:  # a later look may refute it, not save it
+            smaller = smaller or ending
+        elif ending.outcome is Outcome.REFUTED or (
+            smaller is None and (ending.outcome is not Outcome.INCONCLUSIVE or settled)
+        ):
             return ending
+    if smaller is not None and later:
+        n = smaller.look.n + smaller.left_out
+        smaller = replace(smaller, note=f"{smaller.note}more trials do not refute it: of n = {n}, ")
     return smaller or ending
 
 
@@ -175,15 +178,16 @@ def _in_time(trials: Trials) -> Trials:
     return {mark: tuple(trial for trial in of if trial.status != "timeout") for mark, of in trials.items()}
 
 
-def _with_any_result(ending: Ending, assertion: Assertion, design: Design) -> Ending:
-    """Return a decision only where it would be the same with any result of the trials that ran out of time."""
-    known = _in_time(ending.trials)
-    doubt = "" if known == ending.trials else _doubt(assertion, ending.outcome, ending.look, design, known)
-    if not doubt:
-        return ending
-    return replace(
-        ending, outcome=Outcome.INCONCLUSIVE, doubt=f"{_ended(assertion, ending.trials, 'timeout')}; {doubt}"
-    )
+def _with_any_result(ending: Ending, look: Look, trials: Trials, assertion: Assertion, design: Design) -> Ending:
+    """Return a decision only where it would be the same with any result of the trials that ran out of time.
+
+    That is asked of the trials that count, and of all `trials` of the look.
+    """
+    for at, of in ((ending.look, ending.trials), (look, trials)):
+        known = _in_time(of)
+        if known != of and (doubt := _doubt(assertion, ending.outcome, at, design, known)):
+            return replace(ending, outcome=Outcome.INCONCLUSIVE, doubt=f"{_ended(assertion, of, 'timeout')}; {doubt}")
+    return ending
 
 
 def _doubt(assertion: Assertion, outcome: Outcome, look: Look, design: Design, known: Trials) -> str:
@@ -191,9 +195,11 @@ def _doubt(assertion: Assertion, outcome: Outcome, look: Look, design: Design, k
     if outcome is Outcome.INCONCLUSIVE:
         return ""
     p = assertion.highest(known, look.n, design).toward(outcome.direction)
-    if p <= look.alpha:
-        return ""
-    return f"with other results of theirs it need not be {outcome} (p up to {p:.3g}): give them more time"
+    if p > look.alpha:
+        return f"with other results of theirs it need not be {outcome} (p up to {p:.3g}): give them more time"
+    if outcome is Outcome.SMALLER and assertion.bounds(known, look.n, design)[0].refuted <= look.alpha:
+        return "with other results of theirs it may be refuted: give them more time"
+    return ""
 
 
 def attainability(assertion: Assertion, design: Design) -> tuple[tuple[Look, PValues], ...]:
@@ -227,7 +233,7 @@ def _shortage(assertion: Assertion, look: Look, design: Design) -> str:
 def _crashed(assertion: Assertion, trials: Trials) -> str:
     """Return a sentence that names the crashed trials, or nothing; equal messages of a condition are named once."""
     sentences = []
-    for label, mark in {source.label: source.fingerprint for source in assertion.sources()}.items():
+    for mark, label in {source.fingerprint: source.label for source in assertion.sources()}.items():
         crashed = [trial for trial in trials[mark] if trial.status == "crashed"]
         if crashed:
             seeds = ", ".join(trial.seed_in_words for trial in crashed)

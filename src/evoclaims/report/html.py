@@ -22,6 +22,7 @@ from evoclaims.report import across, charts, formatting, replication_cells
 from evoclaims.report.charts import spark_svg
 from evoclaims.report.formatting import plural
 from evoclaims.report.model import FATES, Page, Section
+from evoclaims.verdicts.claim_report import APART, Tally
 from evoclaims.verdicts.sentences import sentences
 from evoclaims.verdicts.transitions import Robustness
 
@@ -96,23 +97,24 @@ def findings(page: Page, lines: Sequence[OpeningLine]) -> list[Finding]:
     first = {line.claim: line for line in reversed(lines)}
     for board in page.boards:
         ended = [
-            (first[one.claim], {case.outcome for case in one.cases} - {Outcome.NOT_RUN})
+            (first[one.claim], {case.counted_as for case in one.cases})
             for one in sentences(section.report for section in board.sections)
             if not one.same_as
         ]
-        judged = [(line, outcomes) for line, outcomes in ended if outcomes]
+        judged = [(line, tallies) for line, tallies in ended if tallies != {Tally.NOT_RUN}]
         if judged:
             return list(_findings(board.tier, judged))
     return []
 
 
-def _findings(tier: str, judged: Sequence[tuple[OpeningLine, set[Outcome]]]) -> Iterator[Finding]:
+def _findings(tier: str, judged: Sequence[tuple[OpeningLine, set[Tally]]]) -> Iterator[Finding]:
     """Yield the sentences whose cases all have one outcome, by outcome, and then the others."""
     of = f"of {plural(len(judged), 'sentence')} ({tier})"
-    for outcome in Outcome:
-        if alike := tuple(line for line, outcomes in judged if outcomes == {outcome}):
-            says = f"{len(alike)} {of}: {outcome} in every case"
-            yield Finding(tier, outcome.name.lower(), outcome.symbol, says, alike)
+    for tally in Tally:
+        if alike := tuple(line for line, outcomes in judged if outcomes == {tally}):
+            says = f"{len(alike)} {of}: {tally} in every case"
+            kind = Outcome.SUPPORTED.name if tally in APART else tally.name
+            yield Finding(tier, kind.lower(), tally.symbol, says, alike)
     if others := tuple(line for line, outcomes in judged if len(outcomes) > 1):
         yield Finding(tier, "", "", f"{len(others)} {of}: cases end differently", others)
 

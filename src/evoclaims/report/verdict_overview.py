@@ -148,6 +148,7 @@ def _evidence(report: ClaimReport) -> str:
     trials = plural(report.n, "trial")
     if report.verdict is None or part is None:
         return trials
+    trials = plural(part.n, "trial")  # those that count: copies count once
     several = len(report.verdict.evidence) > 1
     what = f"{part.samples[0].label.partition(': ')[2]}: " if several and part.samples else ""
     if part.events:

@@ -165,36 +165,39 @@ class Robustness:
         plain: the verdict under the protocol itself.
         outcomes: by variant; a variant that changes none of the claim's trials, or whose trials have not run, is left
             out.
+        fewer: variants that are inconclusive with fewer trials than have decided the protocol's verdict: that may be
+            for want of trials.
     """
 
     claim: str
     tier: str
     plain: Outcome
     outcomes: Mapping[str, Outcome]
+    fewer: frozenset[str] = frozenset()
 
     @property
     def hangs_on(self) -> tuple[str, ...]:
-        """Variants whose verdict is another one than the protocol's; none where the protocol itself has not run."""
+        """Variants whose verdict is another one than the protocol's, and not for want of trials alone.
+
+        None where the protocol itself has not run.
+        """
         if self.plain is Outcome.NOT_RUN:
             return ()
-        return tuple(name for name, outcome in self.outcomes.items() if outcome != self.plain)
+        return tuple(name for name, one in self.outcomes.items() if one != self.plain and name not in self.fewer)
 
 
 def matrix(plain: Sequence[ClaimReport], variants: Mapping[str, Sequence[ClaimReport]]) -> tuple[Robustness, ...]:
     """Return a row for each claim that some variant touches, from reports under the protocol itself and by variant."""
     found = {
-        (report.tier, report.name, name): report.outcome
+        (report.tier, report.name, name): report
         for name, reports in variants.items()
         for report in reports
         if report.outcome != Outcome.NOT_RUN
     }
-    rows = [
-        Robustness(
-            report.name,
-            report.tier,
-            report.outcome,
-            {name: found[key] for name in variants if (key := (report.tier, report.name, name)) in found},
-        )
-        for report in plain
-    ]
+    rows = []
+    for report in plain:
+        varied = {name: found[key] for name in variants if (key := (report.tier, report.name, name)) in found}
+        fewer = {name for name, one in varied.items() if one.outcome is Outcome.INCONCLUSIVE and one.n < report.n}
+        outcomes = {name: one.outcome for name, one in varied.items()}
+        rows.append(Robustness(report.name, report.tier, report.outcome, outcomes, frozenset(fewer)))
     return tuple(row for row in rows if row.outcomes)
