@@ -14,7 +14,7 @@ from custom_robots import BASE, Texts
 from evoclaims.core.errors import UserError
 from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.locomotion import Locomotion, Obstacles
-from evoclaims.envs.ecorobot.robots import ANT, Robot
+from evoclaims.envs.ecorobot.robots import ANT, IN_A_MAZE, ROBOTS, Robot
 from evoclaims.envs.ecorobot.scene import Scene, box_geoms
 from evoclaims.envs.ecorobot.stones import SteppingStones
 
@@ -205,6 +205,15 @@ def test_a_maze_starts_its_robot_where_it_says(change: tuple[str, str], there: b
             UserError,
             match=r"stepping_stones starts its robots at x -3 and y 1, but with these as the first two positions",
         ):
+            SteppingStones(robot=robot)
+
+
+@pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS)
+def test_built_in_robots_that_move_in_a_plane_are_refused_in_a_maze(robot: Robot) -> None:
+    if robot in IN_A_MAZE:
+        assert SteppingStones(robot=robot).start == (-3.0, 1.0)
+    else:
+        with pytest.raises(UserError, match="starts its robots at x -3 and y 1, but with these as the first two"):
             SteppingStones(robot=robot)
 
 

@@ -235,7 +235,12 @@ WALKER2D: Final = replace(
 ROBOTS: Final = {robot.name: robot for robot in (SIMPLE_ROB, ANT, HALF_CHEETAH, HOPPER, HUMANOID, WALKER2D)}
 
 
-def fits_as_built_in(robot: Robot) -> bool:
-    """Whether a robot is a built-in one in all that depends on the model."""
+IN_A_MAZE: Final = (SIMPLE_ROB, ANT, HUMANOID)
+"""Built-in robots that move in x and y; the others move in the plane of x and z."""
+
+
+def fits_as_built_in(robot: Robot, *, in_a_maze: bool) -> bool:
+    """Whether a robot is a built-in one in all that depends on the model; one that can start anywhere in a maze."""
     names = ("xml", "start", "free_coordinates", "seen_velocities", "scales_actions")
-    return any(all(getattr(robot, name) == getattr(one, name) for name in names) for one in ROBOTS.values())
+    built_in = IN_A_MAZE if in_a_maze else ROBOTS.values()
+    return any(all(getattr(robot, name) == getattr(one, name) for name in names) for one in built_in)
