@@ -30,7 +30,7 @@ ELSEWHERE = {
     # standard streams, and nothing
     "cli/main.py": ["os.open"],
     "cli/terminal.py": ["open"],
-    "execution/worker.py": ["os.fdopen"],
+    "execution/worker.py": ["open", "os.fdopen", "os.fdopen"],
     "trials/loop_process.py": ["os.fdopen", "os.fdopen", "os.open"],
     # parts of a file that is open
     "trials/arrays.py": [
