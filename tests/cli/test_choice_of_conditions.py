@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import jax
+import pytest
+from hand_made_verdicts import report, verdict
 from tiny_project import Evoclaims
 
+from evoclaims.cli import run
 from evoclaims.cli.project import open_project
 from evoclaims.cli.running import named
 from evoclaims.trials.result_making import make_unfinished
@@ -79,3 +84,15 @@ def test_run_runs_the_seeds_that_it_is_asked_for_and_none_for_the_drift_check(ev
     for seeds in (["--first-seed=9", "--trials=1"], []):
         assert evoclaims("run", "right", "--on=parity", *seeds)[0] == 0
     assert {result.seed for result in Store(Path(".evoclaims")).results([])} == set(range(10))
+
+
+def test_a_variant_that_fewer_trials_leave_open_is_not_said_to_change_the_verdict(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    plain = [report("A", "refuted", verdict=verdict("refuted", n=30))]
+    varied = [report("A", "inconclusive", verdict=verdict("inconclusive"))]
+    paper = SimpleNamespace(variants={"x": SimpleNamespace(says="otherwise")})
+    project: Any = SimpleNamespace(judge_variants=lambda asked: [plain, varied], reproduction=paper)
+    run._print_matrix(project, "smoke", "x")
+    says = "  A: inconclusive with fewer trials than decide the protocol's own verdict, refuted\n"
+    assert says in capsys.readouterr().out

@@ -162,6 +162,13 @@ def test_a_crashed_trial_makes_the_verdict_an_error(source) -> None:
     assert several.reason == "5 of 10 trials of a crashed (seeds 0, 2, 4, 6, 8)"
 
 
+def test_a_crash_is_seen_in_each_of_two_conditions_of_one_name(source) -> None:
+    plain, crashed = source("a", HIGH), source("a", ["crashed", *LOW[1:]])
+    other = type("Other", (type(crashed),), {"fingerprint": "another id"})("a", crashed.trials)
+    for one, two in ((plain, other), (other, plain)):
+        assert judge(one.score() > two.score(), FIXED_10).outcome is Outcome.ERROR
+
+
 def test_nan_in_a_finished_trial_makes_the_verdict_an_error(source) -> None:
     verdict = judge(source("a", [*HIGH[:9], math.nan]).solved().stays(), FIXED_10)
     assert verdict.outcome is Outcome.ERROR

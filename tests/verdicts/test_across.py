@@ -94,6 +94,13 @@ def test_lines_say_why_one_has_no_verdicts_which_changed_and_what_drifted_how_fa
     ]
 
 
+def test_a_cell_whose_trials_drifted_says_so_though_all_that_could_be_compared_have_the_same_bits(
+    found: Across,
+) -> None:
+    cell = replace(found.cells["ours", "jax 3"], compared=1, changed=0)
+    assert across_report.cell_lines(cell)[1:] == ("A12 0.00, p 5e-05, DRIFT", "0 of 1 differ")
+
+
 def test_trials_that_are_the_same_records_are_not_compared(store: Store) -> None:
     again = replace(_environment(store, "1"), label="again")
     cell = across([_environment(store, "1"), again]).cells["ours", "again"]

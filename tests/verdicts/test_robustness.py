@@ -58,3 +58,5 @@ def test_a_variant_that_is_inconclusive_with_fewer_trials_says_nothing_of_the_de
     assert (row.hangs_on, row.fewer) == (("y",), {"x"})
     (row,) = matrix([judged(Outcome.SUPPORTED, 10)], {"x": [undecided]})
     assert row.hangs_on == ("x",)
+    (row,) = matrix([judged(Outcome.INCONCLUSIVE, 30)], {"x": [undecided]})
+    assert (row.hangs_on, row.fewer) == ((), frozenset())

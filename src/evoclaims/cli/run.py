@@ -123,7 +123,7 @@ def _print_matrix(project: Project, tier: str, variant: str) -> None:
     for row in rows:
         for name, outcome in row.outcomes.items():
             outcomes = f"{row.plain} -> {outcome}" if name in row.hangs_on else f"{outcome} either way"
-            if name in row.fewer and outcome is not row.plain:
+            if name in row.fewer:
                 outcomes = f"{outcome} with fewer trials than decide the protocol's own verdict, {row.plain}"
             if row.plain is Outcome.NOT_RUN:
                 outcomes = f"{outcome}; not run under the protocol itself"

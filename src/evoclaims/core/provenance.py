@@ -123,8 +123,8 @@ def same_bits(one: Mapping[str, Any], other: Mapping[str, Any], but: str = "") -
 
     Only CPUs of one class of machine promise it. A provenance without device, machine or versions says too little.
     """
-    told = all(made.get(part) for made in (one, other) for part in ("device", "machine", "versions"))
-    on_cpu = told and one["device"].get("platform") == other["device"].get("platform") == "cpu"
+    known = all(made.get(part) for made in (one, other) for part in ("device", "machine", "versions"))
+    on_cpu = known and one["device"].get("platform") == other["device"].get("platform") == "cpu"
     return on_cpu and differing(one, other) <= {but}
 
 

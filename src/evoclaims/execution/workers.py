@@ -44,7 +44,7 @@ class Process:
         process: Any = self._process
         pipes: tuple[IO[bytes], ...] = process.stdin, process.stdout, process.stderr
         self._input, self._output, self._error_output = pipes
-        self._said = ""
+        self._last_line = ""
         self._errors = threading.Thread(target=self._pass_errors_on, daemon=True)
         self._errors.start()
         self._ask(order)
@@ -64,8 +64,8 @@ class Process:
         """Return how it has ended, such as "status 7"; or what it has said, where the project cannot be opened."""
         status = self._process.wait()
         self._errors.join()
-        if status == USER_ERROR and self._said:
-            return self._said.rstrip(".")
+        if status == USER_ERROR and self._last_line:
+            return self._last_line.rstrip(".")
         if status == -signal.SIGKILL:
             return "SIGKILL: the system sends that where memory runs out"
         return signal.Signals(-status).name if -status in set(signal.Signals) else f"status {status}"
@@ -100,7 +100,7 @@ class Process:
     def _pass_errors_on(self) -> None:
         for line in self._error_output:
             text = line.decode(errors="replace")
-            self._said = text.strip() or self._said
+            self._last_line = text.strip() or self._last_line
             with contextlib.suppress(OSError, ValueError):  # no room or no reader: the process must not wait for either
                 print(text, end="", file=sys.stderr, flush=True)
 

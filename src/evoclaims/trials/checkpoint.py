@@ -142,10 +142,10 @@ def _opened(path: Path) -> Iterator[tuple[Header, Packed]]:
             packed = Packed(file)
             if packed.nbytes(_HEADER) > _HEADER_BYTES:
                 raise DamagedFileError(path, "its header is longer than that of any batch of trials")
-            told = json.loads(packed[_HEADER].tobytes())
-            if told.get("schema", SCHEMA) != SCHEMA:
-                raise _OtherSchemaError(f"it has schema {told['schema']}, not {SCHEMA}")
-            header = convert(vars(Header(**told)), Header)
+            fields = json.loads(packed[_HEADER].tobytes())
+            if fields.get("schema", SCHEMA) != SCHEMA:
+                raise _OtherSchemaError(f"it has schema {fields['schema']}, not {SCHEMA}")
+            header = convert(vars(Header(**fields)), Header)
             known = all(seed in header.batch for seed in header.seeds)  # as the runner relies on
             if not (known and is_hash(header.condition) and header.curves.keys() == set(map(str, header.batch))):
                 raise DamagedFileError(path, "its header does not describe a batch of trials")

@@ -197,7 +197,8 @@ def matrix(plain: Sequence[ClaimReport], variants: Mapping[str, Sequence[ClaimRe
     rows = []
     for report in plain:
         varied = {name: found[key] for name in variants if (key := (report.tier, report.name, name)) in found}
-        fewer = {name for name, one in varied.items() if one.outcome is Outcome.INCONCLUSIVE and one.n < report.n}
+        undecided = {name: one.n for name, one in varied.items() if one.outcome is Outcome.INCONCLUSIVE}
+        fewer = {name for name, n in undecided.items() if report.outcome is not Outcome.INCONCLUSIVE and n < report.n}
         outcomes = {name: one.outcome for name, one in varied.items()}
         rows.append(Robustness(report.name, report.tier, report.outcome, outcomes, frozenset(fewer)))
     return tuple(row for row in rows if row.outcomes)
