@@ -67,8 +67,8 @@ class DeceptiveMaze(Maze):
 
     def __post_init__(self) -> None:
         """Check the name of the difficulty."""
-        require_known("difficulty", self.difficulty, get_args(Difficulty))  # it names the maze that is checked below
         super().__post_init__()
+        require_known("difficulty", self.difficulty, get_args(Difficulty))
 
     @property
     def plan(self) -> MazePlan:

@@ -104,7 +104,9 @@ class RobotTask(ABC):
         if self.sensor is not None and not callable(getattr(self.sensor, "read", None)):
             raise UserError(f"{self.name} has sensor={self.sensor!r}. Write Rangefinders(…), your own sensor, or None.")
         # The built-in robots fit; to compile them takes longer than to load a paper.
-        if not fits_as_built_in(self.robot, in_a_maze=self.start is not None):
+        # Where they start is not asked of those that fit anywhere: a task may check only later that it has such a maze.
+        anywhere, in_a_plane = (fits_as_built_in(self.robot, in_a_maze=maze) for maze in (True, False))
+        if not (anywhere or (in_a_plane and self.start is None)):
             self._require_fit()
 
     def _require_fit(self) -> None:
