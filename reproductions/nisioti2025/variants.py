@@ -78,6 +78,14 @@ def _narrow_substrate(method: str, task: str, condition: Condition) -> Condition
     return replace(condition, method=replace(evolved, substrate=ecorobot.simple_rob_substrate(hidden=16)))
 
 
+def _largest_layer(method: str, task: str, condition: Condition) -> Condition | None:
+    """HyperNEAT with places up to ± the largest layer in its layered substrates, as in the published code."""
+    evolved: Any = condition.method
+    if not isinstance(evolved, HyperNeat) or evolved.extent == "largest_layer":
+        return None
+    return replace(condition, method=replace(evolved, extent="largest_layer"))
+
+
 def _sigmoid(method: str, task: str, condition: Condition) -> Condition | None:
     """HyperNEAT with only sigmoids in its CPPNs."""
     evolved: Any = condition.method
@@ -237,6 +245,10 @@ VARIANTS = {
         "HyperNEAT's networks have 16 hidden neurons around the simplest robot, as in the published code",
         _narrow_substrate,
     ),
+    "largest_layer": _variant(
+        "HyperNEAT's neurons for robots with limbs are at places up to ± the largest layer, as in the published code",
+        _largest_layer,
+    ),
     "sigmoid": _variant("HyperNEAT's CPPNs have sigmoids only, as in the published code", _sigmoid),
     "lucky_level_up": _variant(
         "PPO goes up a level when its stochastic policy answers 128 random rows right, in 49 tests; in the published "
@@ -268,8 +280,8 @@ VARIANTS = {
         _published_course,
     ),
     "published": _variant(
-        "What the published scripts do otherwise, at once: every variant of one detail but rows_so_far and "
-        "lucky_level_up, which are not theirs (nor their maze, where stones pay nothing)",
+        "What the published scripts do otherwise, at once: every variant of one detail above but rows_so_far and "
+        "lucky_level_up, which are not theirs, and largest_layer (nor their maze, where stones pay nothing)",
         _published,
     ),
     "published_rows_so_far": _variant(
