@@ -78,3 +78,21 @@ def test_a_torn_file_of_reference_trials_is_said(
     path.write_bytes(path.read_bytes()[:-20])
     with pytest.raises(UserError, match="is not a reference trial"):
         Archive(store, tmp_path).trials(condition, [0])
+
+
+def test_an_edited_line_is_an_error_of_who_reads_it_and_a_line_that_is_no_trials_of_everyone(
+    tmp_path: Path, store: Store, made: Any, reproduction: Reproduction
+) -> None:
+    conditions = [reproduction.tier("smoke").condition(method, "small") for method in ("better", "worse")]
+    paths = [references.path_of(tmp_path, "smoke", method, "small") for method in ("better", "worse")]
+    for condition, path in zip(conditions, paths, strict=True):
+        references.write(path, [made(condition, seed, 1.0) for seed in (0, 1)])
+    paths[0].write_bytes(paths[0].read_bytes().replace(b'"seed":1', b'"seed":3'))
+    archive = Archive(store, tmp_path)
+    archive.check()
+    assert [trial is not None for trial in archive.trials(conditions[1], [0, 1, 2])] == [True, True, False]
+    with pytest.raises(UserError, match="Line 2 of .* is not a reference trial"):
+        archive.trials(conditions[0], [0])
+    paths[0].write_bytes(b"{}\n")
+    with pytest.raises(UserError, match="Line 1 of .* is not a reference trial"):
+        Archive(store, tmp_path).check()

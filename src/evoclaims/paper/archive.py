@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -35,13 +36,15 @@ class Archive:
     existing: tuple[Condition, ...] = ()
 
     def check(self) -> None:
-        """Check before anything is judged that the store can be read, and every file of reference trials.
+        """Check before anything is judged that the store can be read, and that every line of reference trials is one.
+
+        Whether a line was edited shows when its trial is read: a command that asks for few reads few.
 
         Raises:
-            UserError: when something else is in the store's place, or a file of reference trials is damaged or edited.
+            UserError: when something else is in the store's place, or a file of reference trials is damaged.
         """
         self.store.check()
-        _ = self._committed
+        _ = self._files, self._imported
 
     def get(self, trial: str, versions: Versions | None = None) -> TrialResult | None:
         """Return the record of the trial with this id, if possible made with `versions` of its packages, or None.
@@ -54,7 +57,7 @@ class Archive:
         here = None if versions is None else self.store.made_with(trial, versions)
         if is_final(here):
             return here
-        committed = self._committed.get(trial, ())
+        committed = self._committed(trial)
         agreeing = next((one for one in committed if versions is not None and agree(one.provenance, versions)), None)
         if agreeing is not None:
             return agreeing
@@ -64,21 +67,46 @@ class Archive:
     def stored(self, trial: str, versions: Versions | None = None) -> TrialResult | None:
         """Return what `get` returns if it is a record of the store; None if it is a committed or an imported one."""
         found = self.get(trial, versions)
-        return None if any(found is one for one in self._committed.get(trial, ())) else found
+        return None if any(found is one for one in self._committed(trial)) else found
 
     def trials(self, condition: Condition, seeds: Sequence[int]) -> tuple[TrialResult | None, ...]:
         """Return a condition's trial for each seed, or None; this environment's records come first."""
         return tuple(self.get(TrialSpec(condition, seed).id, condition.versions) for seed in seeds)
 
+    def _committed(self, trial: str) -> Sequence[TrialResult]:
+        """Return the imported and the reference trials with this id."""
+        files = [self._loaded(path).get(trial, ()) for path in self._files.get(trial, ())]
+        return [*self._imported.get(trial, ()), *itertools.chain.from_iterable(files)]
+
     @cached_property
-    def _committed(self) -> dict[str, list[TrialResult]]:
-        """Reference trials and imported ones by id."""
-        files = sorted(self.references.rglob("*.jsonl")) if self.references is not None else ()
-        found: dict[str, list[TrialResult]] = defaultdict(list)
-        for trials in (*(condition.existing for condition in self.existing), *map(references.load, files)):
-            for trial in trials:
-                found[trial.id].append(trial)
+    def _files(self) -> dict[str, list[Path]]:
+        """The files that have a reference trial, by its id."""
+        found: dict[str, list[Path]] = defaultdict(list)
+        for path in sorted(self.references.rglob("*.jsonl")) if self.references is not None else ():
+            for trial in dict.fromkeys(references.ids(path)):
+                found[trial].append(path)
         return dict(found)
+
+    def _loaded(self, path: Path) -> dict[str, list[TrialResult]]:
+        """Return the reference trials of a file by id; it is read once."""
+        if path not in self._kept:
+            self._kept[path] = _by_id(references.load(path))
+        return self._kept[path]
+
+    @cached_property
+    def _kept(self) -> dict[Path, dict[str, list[TrialResult]]]:
+        return {}
+
+    @cached_property
+    def _imported(self) -> dict[str, list[TrialResult]]:
+        return _by_id(trial for condition in self.existing for trial in condition.existing)
+
+
+def _by_id(trials: Iterable[TrialResult]) -> dict[str, list[TrialResult]]:
+    found: dict[str, list[TrialResult]] = defaultdict(list)
+    for trial in trials:
+        found[trial.id].append(trial)
+    return dict(found)
 
 
 @dataclass(frozen=True)

