@@ -94,8 +94,12 @@ def judge(
     outcome, look, finding, n = ending.outcome, ending.look, ending.finding, ending.look.n + ending.left_out
     if finding is None:
         return Verdict(outcome, ending.note.removesuffix("; "), assertion.describe(), mark, n=n, copies=ending.copies)
-    sides = {side: finding.evidence[finding.deciding(side)].p is not None for side in Direction}  # a fact has no p
-    tested = any(entry.p is not None for entry in finding.evidence)
+    tested = any(entry.p is not None for entry in finding.evidence)  # a fact has no p
+    by_fact = {side: finding.evidence[finding.deciding(side)].p is None for side in Direction}
+
+    def p_of(side: Direction, p: float | None) -> float | None:
+        return p if tested and not (by_fact[side] and p == 0.0) else None
+
     return Verdict(
         outcome=outcome,
         reason=ending.note + (ending.doubt or _reason(finding, look, assertion, design)),
@@ -103,16 +107,16 @@ def judge(
         fingerprint=mark,
         n=n,
         alpha=look.alpha,
-        p=finding.p.supported if sides[Direction.FOR] else None,
+        p=p_of(Direction.FOR, finding.p.supported),
         attainable_p=finding.attainable.supported if tested else None,
-        p_refuted=finding.p.refuted if sides[Direction.AGAINST] else None,
+        p_refuted=p_of(Direction.AGAINST, finding.p.refuted),
         attainable_p_refuted=finding.attainable.refuted if tested else None,
         evidence=finding.evidence,
         without_result=_without_result(assertion, ending.trials),
         overspent=overspent(assertion, ending.trials)[0],
         copies=ending.copies,
         deciding=finding.deciding(outcome.direction),
-        p_smaller=finding.p.smaller if sides[Direction.SIZE] else None,
+        p_smaller=p_of(Direction.SIZE, finding.p.smaller),
         attainable_p_smaller=finding.attainable.smaller,
     )
 
