@@ -3,42 +3,59 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Any
 
+import jax
+import jax.numpy as jnp
+import numpy as np
+
 from evoclaims import Condition, NullAgent
-from evoclaims.envs import Circuit, DeceptiveMaze, RobotTask, SteppingStones
+from evoclaims.envs import Circuit, DeceptiveMaze, Locomotion, Obstacles, SteppingStones
+from evoclaims.envs.ecorobot.pose import Pose
 from evoclaims.methods import Neat
 from reproductions.nisioti2025.measures import constant_success
-
-ARENA = math.hypot(8.0, 8.0)
-"""The diagonal by which the stones' shaping is divided, m."""
 
 Numbers = dict[str, dict[str, Any]]
 
 
 def no_action(condition: Condition) -> Numbers | None:
-    """Return what a robot has that stays where it starts: a test compares it with robots that take no action."""
+    """Return what a robot has that stays where it starts; None where that is not known."""
     task = condition.task
-    if not isinstance(task, RobotTask):
-        return None
-    reward, metrics = 0.0, dict[str, float]()
-    if isinstance(task, SteppingStones):
-        reward = task.episode_steps * (1.0 - math.dist(task.plan.start, task.stones[0]) / ARENA)
-        metrics = {"stones": 0.0}
-    elif isinstance(task, DeceptiveMaze):
-        metrics = {"distance": math.dist(task.plan.start, task.plan.target) - task.plan.within}
-    else:
-        metrics = {"obstacles": 0.0, "furthest": 0.0}
-        if task.robot.name == "ant":
-            reward = float(task.episode_steps)  # Brax pays an ant 1 a step to be up
+    metrics: dict[str, float]
     if isinstance(task, SteppingStones | DeceptiveMaze):
-        metrics["coverage"] = 1.0 / float(task.reachable().sum())  # the cell in which it starts
+        reward = _still(task)
+        metrics = {"coverage": 1.0 / float(task.reachable().sum())}  # the cell in which it starts
+        if isinstance(task, SteppingStones):
+            metrics["stones"] = 0.0
+        else:
+            metrics["distance"] = math.dist(task.plan.start, task.plan.target) - task.plan.within
+    elif isinstance(task, Locomotion | Obstacles):
+        metrics = {"obstacles": 0.0, "furthest": 0.0}
+        # Brax pays an ant 1 a step to be up
+        reward = float(task.episode_steps) if task.robot.name == "ant" else 0.0
+    else:
+        return None
     idle = dict.fromkeys(("control_cost", "effort", "upside_down", "reached"), 0.0)
     return {
         "metrics": {**_nothing_solved(0.0), "last_fitness": reward, **idle, **metrics},
         "levels": {},
         "curves": {"coverage": (metrics.get("coverage", 0.0),), "reached": (0.0,), "fitness": (reward, reward)},
     }
+
+
+@lru_cache
+def _still(task: SteppingStones | DeceptiveMaze) -> float:
+    """Return what the task's own rule pays in an episode for staying at the start: variants pay otherwise."""
+    place = Pose(place=jnp.array([*task.plan.start, 0.0], jnp.float32), rotation=jnp.eye(3, dtype=jnp.float32))
+
+    def step(memory: Any, _: None) -> Any:
+        ruling = task.rule(memory, place, place, jnp.zeros(0))
+        return ruling.memory, (ruling.reward, ruling.ended)
+
+    _, (paid, ended) = jax.lax.scan(step, task.memory(place), length=task.episode_steps)
+    # The step that ends an episode is paid, too.
+    return math.fsum(np.asarray(paid)[np.cumsum(ended) - ended == 0].tolist())
 
 
 def constant_circuit(condition: Condition) -> Numbers | None:

@@ -94,6 +94,17 @@ def test_a_variant_shows_the_verdicts_that_it_may_change_and_which_it_does(statu
     assert "There is no variant named 'trade'. Did you mean 'traded'?" in err
 
 
+def test_an_error_under_a_variant_is_no_verdict_and_fails_as_in_pytest(status: Evoclaims, project: Project) -> None:
+    project.write("""
+@says("E1")
+def test_lacks_its_number(trials, verdict):
+    verdict(trials("right", on="parity").event("odd", lambda trial: trial.metrics["odd"] > 0).in_most_trials())
+""")
+    code, out, _ = status("--variant=traded")
+    assert (code, out.count("There is no 'odd' in the finished trial")) == (1, 1)
+    assert project.run("-m", "smoke", "--claims-variant=traded").ret == 1
+
+
 def test_other_programs_read_the_same_verdicts(status: Evoclaims) -> None:
     code, out, _ = status("--as=json")
     assert code == 1

@@ -99,6 +99,13 @@ def test_a_method_is_tested_by_all_its_conditions_together(case) -> None:
     assert together.detectable["ppo"] < min(shift for name, shift in together.detectable.items() if name != "ppo")
 
 
+def test_where_a_drift_shows_is_asked_at_the_level_at_which_it_was_found(case) -> None:
+    """Both conditions have moved by what is found at 0.1, and at 0.01 would not be."""
+    up = [0.56, 0.60, 0.64, 0.68, 0.70, 0.72]
+    found = check_drift([case(up, label=f"ppo on {n}", method="ppo") for n in range(2)], alpha=0.2)
+    assert [row.drifted for row in found.rows] == [True, True]
+
+
 def test_the_joint_p_is_that_of_all_permutations(case) -> None:
     """Two measures of one condition, whose 3,003 splits are few enough to list."""
     rng = np.random.default_rng(7)

@@ -56,6 +56,16 @@ def test_a_verdict_rests_on_the_p_of_its_own_direction(source) -> None:
     assert judge(source("a", [1.0] * 10).solved().in_every_trial(), FIXED_10).decision is None
 
 
+def test_a_compound_that_a_fact_decides_has_no_p_of_a_test(source) -> None:
+    sound = source("a", RISING).score()
+    fails = source("b", [1.0] * 9 + [0.0]).solved().in_every_trial()
+    verdict = judge((sound < source("c", [value + 20 for value in RISING]).score()) & fails, FIXED_10)
+    assert (verdict.outcome, verdict.decision, verdict.p_refuted) == (Outcome.REFUTED, None, None)
+    assert verdict.reason == f"{fails.describe()}: does not hold for seeds 9"
+    verdict = judge(source("d", [1.0] * 10).solved().in_every_trial() | (sound > 5), FIXED_10)
+    assert (verdict.outcome, verdict.decision) == (Outcome.SUPPORTED, None)
+
+
 def test_the_part_that_decided_is_named_whatever_the_compound(source) -> None:
     yes, no, open_ = (
         source(name, [1.0] * held + [0.0] * (10 - held)).solved().in_most_trials(p0=0.6)

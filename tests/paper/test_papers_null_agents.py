@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from typing import Any
 
 import jax
@@ -39,6 +40,24 @@ def test_a_robot_at_its_start_has_the_numbers_of_the_agent(names: tuple[str, str
         assert told[name] == pytest.approx(float(value), rel=1e-5), name
     path = task.path_measures(outing.pose.place[None, :2], jnp.ones(1, bool))
     assert told["coverage"] == pytest.approx(float(path["coverage"]), rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("variant", "names", "reward"),
+    [
+        ("", ("neat", "stones"), 1_000 * (1 - 2.5 / math.hypot(8, 8))),
+        ("pay_once", ("neat", "stones"), 1 - 2.5 / math.hypot(8, 8)),
+        ("after_next", ("neat", "stones"), 1_000 * (1 - 6.2 / math.hypot(8, 8))),
+        ("big_maze_ant", ("neat", "stones_ant"), 1_000 * (1 - math.hypot(2.5, 2) / math.hypot(12, 12))),
+        ("submission", ("neat", "stones_ant"), 1_000 * (1 - math.hypot(7.5, 2) / math.hypot(12, 12))),
+        ("submission_once", ("neat", "stones"), 1 - 6.2 / math.hypot(8, 8)),
+        ("easy_as_coded", ("ppo", "deceptive_maze_easy"), math.hypot(4, 9) - math.hypot(1, 8)),
+    ],
+)
+def test_an_idle_robot_earns_what_the_variant_pays(variant: str, names: tuple[str, str], reward: float) -> None:
+    numbers = no_action(REPRODUCTION.tier("full", variant).condition(*names))
+    assert numbers is not None
+    assert numbers["metrics"]["last_fitness"] == pytest.approx(reward, rel=1e-5)
 
 
 def test_no_constant_circuit_is_right_more_often_than_the_agent() -> None:

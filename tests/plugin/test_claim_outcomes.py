@@ -162,6 +162,8 @@ def test_junit_properties_tell_the_verdict(project: Any) -> None:
         assert len(properties) == len(list(case.iter("property"))) == 7
         failures = [failure.get("message") for failure in case.iter("failure")]
         found[properties["claim"]] = (properties["verdict"], properties["tier"], properties["n"], failures)
+        (p,) = properties.keys() & {"p", "p_refuted", "p_smaller"}
+        assert (p, float(properties[p]) < 0.05) == ("p" if properties["claim"] == "a" else "p_refuted", True)
     assert found["a"] == ("supported", "smoke", "10", [])
     assert found["b"][:3] == ("refuted", "smoke", "10")
     assert found["b"][3][0].startswith("b (smoke) is refuted: p = ")

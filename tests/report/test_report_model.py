@@ -73,9 +73,21 @@ def test_diverged_trials_stand_apart_and_are_said(lab: Laboratory) -> None:
     better, worse = section.parts[0].strips
     assert better.apart == ()
     assert (worse.apart, len(worse.dots), worse.n) == (((4, "diverged"), (5, "diverged")), 4, 6)
-    assert section.warnings == (
-        "2 of 12 trials did not run to their end (2 × diverged; seeds 4, 5). They take the worst rank.",
-    )
+    assert section.warnings == ("2 of 12 trials diverged and count as the worst result (seeds 4, 5).",)
+
+
+@pytest.mark.parametrize(
+    ("status", "said"),
+    [
+        ("crashed", "1 of 12 trials crashed, so that the claim is an error (seeds 5)."),
+        ("timeout", "1 of 12 trials ran out of time, with results that are unknown and decide nothing (seeds 5)."),
+    ],
+)
+def test_what_is_said_of_a_trial_without_a_result_is_true_of_it(lab: Laboratory, status: str, said: str) -> None:
+    lab.put("better", [1.0] * 6)
+    lab.put("worse", [0.1] * 5)
+    lab.store.put(record(CONDITIONS["worse", "small"], 5, 0.3, status=status), {})
+    assert lab.section(lab.judge(better_wins)).warnings == (said,)
 
 
 def test_a_diverged_trial_of_an_event_is_no_dot(lab: Laboratory) -> None:

@@ -29,7 +29,7 @@ FORMS: Final[Mapping[str, Callable[[Sequence[ClaimReport]], str]]] = {
 
 
 def main(options: argparse.Namespace) -> int:
-    """Print the verdicts; 1 when something is refuted or broken without being accepted, save under a variant."""
+    """Print the verdicts; 1 when something is refuted or broken without being accepted, under a variant if broken."""
     if options.form not in (None, *FORMS):
         raise UnknownNameError("form of a table", options.form, FORMS)
     project = open_project(options.storage)
@@ -55,7 +55,7 @@ def main(options: argparse.Namespace) -> int:
             print(_changes(protocol, reports, project.reproduction, options.variant))
     else:
         print(FORMS[options.form](reports), end="")
-    return int(not options.variant and any(report.failed for report in reports))
+    return int(any(report.failed for report in reports))
 
 
 def _where_from(reports: Sequence[ClaimReport], project: Project) -> str:

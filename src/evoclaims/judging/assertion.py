@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from itertools import chain
 from typing import Any, ClassVar, NoReturn
@@ -286,10 +286,13 @@ class Compound(Assertion):
         findings = [part.find(trials, design, alpha) for part in self.parts]
         undecided = PValues(1.0, 1.0)
         ps = [undecided if finding.p.contradict(alpha) else finding.p for finding in findings]
+        several = len(self.parts) if self.weakest is Direction.AGAINST else 1
         return Finding(
             p=self.combine(ps),
             attainable=self.combine([finding.attainable for finding in findings]),
-            describe=lambda: tuple(entry for finding in findings for entry in finding.evidence),
+            describe=lambda: tuple(
+                replace(entry, shares=entry.shares * several) for finding in findings for entry in finding.evidence
+            ),
             deciding=lambda direction: self._deciding(findings, ps, direction),
         )
 

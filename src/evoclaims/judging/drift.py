@@ -109,7 +109,7 @@ def check_drift(cases: Sequence[DriftCase], alpha: float = ALPHA) -> DriftReport
                 families.setdefault(case.method or case.label, []).extend(conditions)
         count = permutations_for(len(families), alpha)
         adjusted = dict(zip(families, holm([p_by_blocks(those, count) for those in families.values()]), strict=True))
-        places = {name: places_of(those, count, ALPHA) for name, those in families.items() if adjusted[name] <= alpha}
+        places = {name: places_of(those, count, alpha) for name, those in families.items() if adjusted[name] <= alpha}
         for name, those in families.items():
             detectable[name] = max(detectable.get(name, 0.0), detectable_shift(those, alpha / len(families)))
         for case, (conditions, without) in zip(mine, prepared, strict=True):

@@ -14,7 +14,7 @@ from evoclaims.judging.design import Design, Look
 from evoclaims.judging.exact import MAX_TRIALS
 from evoclaims.judging.sample import Source, Trials, UnreadableTrialError
 from evoclaims.judging.spending import overspent
-from evoclaims.judging.verdict import Outcome, PValues, Verdict
+from evoclaims.judging.verdict import Direction, Outcome, PValues, Verdict
 from evoclaims.trials.failed import place, why
 from evoclaims.trials.result import TrialResult
 
@@ -95,6 +95,11 @@ def judge(
     if finding is None:
         return Verdict(outcome, ending.note.removesuffix("; "), assertion.describe(), mark, n=n, copies=ending.copies)
     tested = any(entry.p is not None for entry in finding.evidence)  # a fact has no p
+    by_fact = {side: finding.evidence[finding.deciding(side)].p is None for side in Direction}
+
+    def p_of(side: Direction, p: float | None) -> float | None:
+        return p if tested and not (by_fact[side] and p == 0.0) else None
+
     return Verdict(
         outcome=outcome,
         reason=ending.note + (ending.doubt or _reason(finding, look, assertion, design)),
@@ -102,16 +107,16 @@ def judge(
         fingerprint=mark,
         n=n,
         alpha=look.alpha,
-        p=finding.p.supported if tested else None,
+        p=p_of(Direction.FOR, finding.p.supported),
         attainable_p=finding.attainable.supported if tested else None,
-        p_refuted=finding.p.refuted if tested else None,
+        p_refuted=p_of(Direction.AGAINST, finding.p.refuted),
         attainable_p_refuted=finding.attainable.refuted if tested else None,
         evidence=finding.evidence,
         without_result=_without_result(assertion, ending.trials),
         overspent=overspent(assertion, ending.trials)[0],
         copies=ending.copies,
         deciding=finding.deciding(outcome.direction),
-        p_smaller=finding.p.smaller,
+        p_smaller=p_of(Direction.SIZE, finding.p.smaller),
         attainable_p_smaller=finding.attainable.smaller,
     )
 
@@ -323,6 +328,9 @@ def _reason(finding: Finding, look: Look, assertion: Assertion, design: Design) 
     facts = "; ".join(entry.detail for entry in finding.evidence if entry.p is None)
     if facts and all(entry.p is None for entry in finding.evidence):
         return facts
+    decided = finding.evidence[finding.deciding(outcome.direction)]
+    if outcome in (Outcome.SUPPORTED, Outcome.REFUTED) and decided.p is None:
+        return f"{decided.describe}: {decided.detail}"
     if outcome is Outcome.SUPPORTED:
         return f"p = {p.supported:.3g} <= {at}"
     if outcome is Outcome.REFUTED:

@@ -180,6 +180,7 @@ class Evidence:
         detail: further information for the reader.
         bounds: what the trials are compared with.
         events: whether values say that something held (1) or did not (0).
+        shares: by how many alternatives ("or") Holm's correction divides α where this part supports the whole.
     """
 
     kind: str
@@ -200,6 +201,7 @@ class Evidence:
     events: bool = False
     p_smaller: float | None = None
     attainable_p_smaller: float | None = None
+    shares: int = 1
 
     @property
     def direction(self) -> Direction:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Generator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import pytest
 
@@ -46,6 +46,9 @@ def shortened(excinfo: pytest.ExceptionInfo[BaseException], item: pytest.Item) -
     showlocals = item.config.getoption("showlocals")
     return excinfo.getrepr(style="long" if style == "auto" else style, showlocals=showlocals, tbfilter=kept)
 
+
+P_NAMES: Final = {"for": "p", "against": "p_refuted", "against its size": "p_smaller"}
+"""Names of the p that decides, as in the tables of `evoclaims status`, by its direction."""
 
 VERDICTS: pytest.StashKey[VerdictFixture] = pytest.StashKey()
 """Under which a claim's test keeps what its fixture `verdict` has judged."""
@@ -173,11 +176,13 @@ def _give_outcome(
         ("verdict", str(claimed.outcome)),
         ("reason", claimed.reason),
         ("n", claimed.n),
-        ("p", claimed.p),
         ("evidence", claimed.evidence),
     ]
+    decision = claimed.verdict.decision if claimed.verdict else None
+    if decision is not None:
+        properties.append((P_NAMES[decision.direction], decision.p))
     for kept in (item.user_properties, report.user_properties):  # JUnit's file takes those of the teardown's report
-        names = dict(properties)
+        names = {*dict(properties), *P_NAMES.values()}
         kept[:] = [one for one in kept if one[0] not in names] + properties  # in place of an earlier run's
 
 

@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Final
 
 from evoclaims.judging.design import Design
 from evoclaims.judging.verdict import Outcome
@@ -14,7 +14,7 @@ from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.report import audit, replication_cells, table_cells, training_curves, trial_summary
 from evoclaims.report.evidence import Part, judged_parts, unjudged_part
-from evoclaims.report.formatting import Anchors, clean, counted, listed, places, plural
+from evoclaims.report.formatting import Anchors, clean, listed, places, plural
 from evoclaims.report.model import Board, ConditionTrials, Page, Section, fault_grid
 from evoclaims.report.trial_summary import Reader, TrialSummary
 from evoclaims.verdicts import other_code
@@ -180,16 +180,21 @@ def _change(entries: Sequence[AcceptedVerdict], report: ClaimReport) -> str:
     return ""
 
 
+ENDINGS: Final = {
+    "crashed": "crashed, so that the claim is an error",
+    "diverged": "diverged and count as the worst result",
+    "timeout": "ran out of time, with results that are unknown and decide nothing",
+}
+"""What became of trials without a result, by their status."""
+
+
 def _broken(trials: Sequence[TrialSummary]) -> tuple[str, ...]:
     """Say which trials have no valid result."""
-    failed = [trial for trial in trials if trial.status != "done"]
     found = []
-    if failed:
-        seeds = listed(sorted({trial.seed for trial in failed}))
-        found.append(
-            f"{len(failed)} of {plural(len(trials), 'trial')} did not run to their end "
-            f"({counted(trial.status for trial in failed)}; seeds {seeds}). They take the worst rank."
-        )
+    for status, ended in ENDINGS.items():
+        if failed := [trial for trial in trials if trial.status == status]:
+            seeds = listed(sorted({trial.seed for trial in failed}))
+            found.append(f"{len(failed)} of {plural(len(trials), 'trial')} {ended} (seeds {seeds}).")
     without = [t for t in trials if t.status == "done" and t.score is not None and math.isnan(t.score)]
     if without:
         found.append(f"The mean success of finished trials is NaN (seeds {listed(t.seed for t in without)}).")

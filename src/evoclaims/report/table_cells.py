@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from evoclaims.judging.design import Look, comparison_power
 from evoclaims.judging.kinds.greater import Greater
 from evoclaims.judging.power import RATES, event_power
-from evoclaims.judging.verdict import Direction, Outcome
+from evoclaims.judging.verdict import Direction, Evidence, Outcome
 from evoclaims.report.formatting import p_value, place_key, places
 from evoclaims.verdicts import other_code
 from evoclaims.verdicts.claim_report import CONTROL, MECHANISM, ClaimReport, Tally, Tried
@@ -47,24 +47,30 @@ def remarks(report: ClaimReport) -> str:
 def power(report: ClaimReport) -> str:
     """Return how often undecided parts would be supported at some true rates, or effects; empty for other verdicts.
 
-    Of a comparison: by its last look alone, and without ties, which make it harder.
+    Of a comparison: by its last look alone, and without ties, which make it harder. Of alternatives, each has its share
+    of α.
     """
     verdict = report.verdict
     if verdict is None or report.outcome is not Outcome.INCONCLUSIVE or not report.attainable:
         return ""
     open_ = [part for part in verdict.evidence if part.outcome is not Outcome.SUPPORTED and part.bounds]
-    looks = [Look(look.n, look.alpha) for look in report.attainable]
     rates = ", ".join(f"{rate:g}" for rate in RATES)
 
-    def at_rates(p0: float) -> str:
-        return ", ".join(f"{event_power(looks, p0, rate):.2f}" for rate in RATES)
+    def looks(part: Evidence) -> list[Look]:
+        return [Look(look.n, look.alpha / part.shares) for look in report.attainable]
 
-    effects = ", ".join(f"{a12:g}" for a12 in EFFECTS)
-    found = ", ".join(f"{comparison_power(looks[-1].n, looks[-1].alpha, a12):.2f}" for a12 in EFFECTS)
+    def at_rates(part: Evidence) -> str:
+        return ", ".join(f"{event_power(looks(part), part.bounds[0].value, rate):.2f}" for rate in RATES)
+
+    def at_effects(part: Evidence) -> str:
+        last = looks(part)[-1]
+        return ", ".join(f"{comparison_power(last.n, last.alpha, a12):.2f}" for a12 in EFFECTS)
+
+    effects, n = ", ".join(f"{a12:g}" for a12 in EFFECTS), report.attainable[-1].n
     return "; ".join(
-        f"“{part.describe}” is supported with probability {at_rates(part.bounds[0].value)} at true rates of {rates}"
+        f"“{part.describe}” is supported with probability {at_rates(part)} at true rates of {rates}"
         if part.events
-        else f"“{part.describe}” is supported by {looks[-1].n} trials with probability {found} at an A12 of {effects}"
+        else f"“{part.describe}” is supported by {n} trials with probability {at_effects(part)} at an A12 of {effects}"
         for part in open_
         if part.events or part.kind == Greater.kind
     )
