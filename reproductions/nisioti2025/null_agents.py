@@ -47,13 +47,20 @@ def no_action(condition: Condition) -> Numbers | None:
 @lru_cache
 def _still(task: SteppingStones | DeceptiveMaze) -> float:
     """Return what the task's own rule pays in an episode for staying at the start: variants pay otherwise."""
-    place = Pose(place=jnp.array([*task.plan.start, 0.0], jnp.float32), rotation=jnp.eye(3, dtype=jnp.float32))
+    place = Pose(place=np.float32([*task.plan.start, 0.0]), rotation=np.eye(3, dtype=np.float32))
 
     def step(memory: Any, _: None) -> Any:
         ruling = task.rule(memory, place, place, jnp.zeros(0))
         return ruling.memory, (ruling.reward, ruling.ended)
 
-    _, (paid, ended) = jax.lax.scan(step, task.memory(place), length=task.episode_steps)
+    def first() -> Any:
+        start = task.memory(place)
+        return start, *step(start, None)
+
+    start, after, (reward, over) = jax.jit(first)()
+    if not over and jax.tree.all(jax.tree.map(np.array_equal, start, after)):  # so every step is the first one again
+        return math.fsum([float(reward)] * task.episode_steps)
+    _, (paid, ended) = jax.lax.scan(step, start, length=task.episode_steps)
     # The step that ends an episode is paid, too.
     return math.fsum(np.asarray(paid)[np.cumsum(ended) - ended == 0].tolist())
 
