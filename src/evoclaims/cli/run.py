@@ -81,7 +81,7 @@ def main(options: argparse.Namespace) -> int:
         print(f"{job.label} ({options.tier}): nothing to run: {where_from(wanted.pop(job))}")
     if options.retry:
         for condition in wanted.values():
-            store.forget_timeouts((TrialSpec(condition, seed).id for seed in seeds), condition.versions)
+            StoredTrials(store, condition).forget_timeouts(seeds)
     complete = {job for job, condition in wanted.items() if not StoredTrials(store, condition).missing(seeds)}
     failed = 0
     for ended in running.run(wanted, lambda text: print(f"  {text}", flush=True)):
