@@ -388,9 +388,12 @@ def test_a_claim_whose_trials_are_there_is_judged_where_those_for_the_drift_chec
         store.record_path(TrialSpec(condition, seed).id, condition.versions).write_text("{")
         ahead = Ahead(Host(2, ()), WorkOrder(str(store.root), "", "cpu", 0, 0), session.reproduction, store, 1e9, print)
         ahead._errors[condition.id] = "the store is damaged"
-        for mode in (RunMissing(store, "cpu", ignore, wait=wait, for_drift=more) for wait in (_no_wait, ahead.wait)):
+        for wait in (_no_wait, ahead.wait):
+            mode = RunMissing(store, "cpu", ignore, wait=wait, for_drift=more)
             if whole:
                 assert [trial.seed for trial in mode(condition, range(6))] == [*range(6)]
+                # The drift check itself names a file that it cannot read.
+                assert mode.unmade == ({} if wait is _no_wait else {condition.id: "the store is damaged"})
             else:
                 with pytest.raises(UserError, match=r"it is not one whole JSON text|the store is damaged"):
                     mode(condition, range(6))

@@ -58,10 +58,10 @@ def test_both_tiers_and_a_variant_run_in_processes(project: Any) -> None:
     assert result.parseoutcomes()["refuted"] == 2
 
 
-@pytest.mark.parametrize("processes", ["0", "many"])
-def test_a_number_that_is_none_is_refused(project: Any, sentence: Any, processes: str) -> None:
+@pytest.mark.parametrize(("processes", "more"), [("0", ()), ("many", ()), ("many", ("--collect-only",))])
+def test_a_number_that_is_none_is_refused(project: Any, sentence: Any, processes: str, more: tuple[str, ...]) -> None:
     project.write(a="supported")
-    result = project.run(f"--claims-processes={processes}", own_store=True)
+    result = project.run(f"--claims-processes={processes}", *more, own_store=True)
     assert result.ret == pytest.ExitCode.USAGE_ERROR
     sentence(result, "--claims-processes takes a number from 1 up, or auto")
 

@@ -87,9 +87,13 @@ def check(config: pytest.Config) -> None:
     Raises:
         pytest.UsageError: with a sentence.
     """
-    changes = config.getoption("claims_compare_fail")
+    changes, processes = config.getoption("claims_compare_fail"), config.getoption("claims_processes")
     try:
         _check_root(config)
+        if processes != "1":
+            from evoclaims.execution.host import processes_of
+
+            processes_of(processes, "--claims-processes")
         if changes is not None:
             _check_changes(config, changes)
         if config.getoption("claims_committed") and not config.getoption("claims_stored"):
