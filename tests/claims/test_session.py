@@ -415,7 +415,7 @@ def test_trials_for_the_drift_check_are_asked_of_processes_on_cpus_alone(
         monkeypatch.setattr(
             Ahead, "_run", lambda self, runs: asked.extend(job for run in runs for job in run.conditions)
         )
-        works = {condition.id: Work(("better", "small"), "smoke", "", 0, dict.fromkeys(range(12), ""), COST)}
+        works = {condition.id: Work(("better", "small"), ("smoke",), "", 0, dict.fromkeys(range(12), ""), COST)}
         one = Ahead(Host(2, gpus), WorkOrder("", "", "cpu", 0, 0), paper, session.store, limit, print)
         one.start(Workload("", {"claim": (condition.id,)}, works), {"smoke": range(6)})
         one.stop()
@@ -447,7 +447,7 @@ def test_what_was_not_asked_for_beforehand_waits_for_gpus(
     monkeypatch.setattr(Workers, "run", run)
     order = WorkOrder(str(session.store.root), "", "cpu", 0, 0)
     ahead = Ahead(Host(2, gpus), order, session.reproduction, session.store, 1e9, print)
-    works = {better.id: Work(("better", "small"), "smoke", "", 0, dict.fromkeys(range(6), ""), COST)}
+    works = {better.id: Work(("better", "small"), ("smoke",), "", 0, dict.fromkeys(range(6), ""), COST)}
     ahead.start(Workload("", {"claim": tuple(works)}, works), {"smoke": range(6)})
     ahead.wait(worse, [0])
     judged.set()
@@ -474,7 +474,7 @@ def test_a_trial_that_crashes_in_a_worker_is_run_once_and_its_claim_says_so(
     monkeypatch.setattr(Workers, "run", run)
     order = WorkOrder(str(session.store.root), "", "cpu", 0, 0)
     ahead = Ahead(Host(2, ()), order, session.reproduction, session.store, 1e9, print)
-    works = {better.condition.id: Work(("better", "small"), "smoke", "", 0, dict.fromkeys(range(6), ""), COST)}
+    works = {better.condition.id: Work(("better", "small"), ("smoke",), "", 0, dict.fromkeys(range(6), ""), COST)}
     ahead.start(Workload("", {"claim": tuple(works)} if known else {}, works if known else {}), {"smoke": range(6)})
     running = replace(session, fetch=RunMissing(session.store, "cpu", ignore, wait=ahead.wait))
     for _ in range(2):
