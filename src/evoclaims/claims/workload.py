@@ -131,16 +131,16 @@ def _works(
     wanted: dict[str, Wanted] = {}
     for name, need in needs.items():
         group, seeds = need.group, sorted(need.seeds)
-        more = fetch.more(group.condition, seeds)
-        wanted[name] = Wanted((group.method, group.task), group.condition, [*seeds, *more])
+        known = [*seeds, *fetch.more(group.condition, seeds)]
+        wanted[name] = Wanted((group.method, group.task), group.condition, known)
     store, paper = session.store, session.reproduction
     estimator = Estimator(store, paper, tier, platform, time_limit=fetch.time_limit, any_version=fetch.any_version)
     works = {}
     for name, owed in estimator.owed(wanted).items():
-        names, condition, seeds = wanted[name].names, wanted[name].condition, wanted[name].seeds
+        names, condition = wanted[name].names, wanted[name].condition
         files = {seed: store.record_path(TrialSpec(condition, seed).id, condition.versions) for seed in owed.seeds}
         missing = {seed: str(path.relative_to(store.root)) for seed, path in files.items()}
-        stored, tiers = len(seeds) - len(missing), tuple(needs[name].tiers)
+        stored, tiers = len(wanted[name].seeds) - len(missing), tuple(needs[name].tiers)
         works[name] = Work(names, tiers, condition.programs, stored, missing, owed.cost)
     return works
 

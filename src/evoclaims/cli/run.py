@@ -60,8 +60,8 @@ def to_run(running: Execution, names: Sequence[Names]) -> list[Names]:
 def main(options: argparse.Namespace) -> int:
     """Run what is missing and list the trials; 1 when a condition failed, which does not stop the others."""
     project = open_project(options.storage)
-    reproduction, store = project.reproduction, project.store
-    tier, chosen = choose(reproduction, options)
+    store = project.store
+    tier, chosen = choose(project, options)
     n = options.trials if options.trials is not None else tier.design.last.n
     if not 1 <= n <= MAX_TRIALS:
         raise UserError(
