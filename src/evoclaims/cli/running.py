@@ -49,7 +49,11 @@ def choose(project: Project, options: argparse.Namespace) -> tuple[Tier, list[Na
 
 def _needed(project: Project, tier: str, known: Sequence[Names]) -> list[Names]:
     """Return the conditions that claims of a tier need; a claim whose test breaks needs what it has asked for."""
-    (claims,) = project.collect([("", tier)])
+    try:
+        (claims,) = project.collect([("", tier)])
+    except UserError as error:
+        example = f", as in {' --on '.join(known[0])}" * bool(known)
+        raise UserError(f"{error} Without claims only named conditions run{example}.") from error
     needed = {names for one in claims for names in (one.groups or [(group.method, group.task) for group in one.asked])}
     others = [names for names in known if names not in needed]
     if others:
