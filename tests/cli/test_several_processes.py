@@ -331,14 +331,14 @@ def deadly(project: Project) -> Project:
 @pytest.mark.usefixtures("deadly")
 def test_a_killed_workers_batch_is_done_again_and_nothing_is_lost_or_twice(evoclaims: Evoclaims) -> None:
     Path("deaths").write_text("1")
-    status, out, err = evoclaims("run", "--numprocesses=2", "--trials=3")
+    status, out, err = evoclaims("run", "--on=parity", "--numprocesses=2", "--trials=3")
     assert (status, err.count("it is begun again")) == (0, 1)
     assert "killed on parity: its process died (SIGKILL: the system sends that where memory runs out)" in err
     store, alone = Store(Path(".evoclaims")), Store(Path("alone"))
     assert len(store.ids()) == 9
     assert verify(store, repair=False) == []
     assert out.count("3 of 3 conditions have ended") == 1
-    assert evoclaims("run", "--trials=3", "--storage=alone")[0] == 0
+    assert evoclaims("run", "--on=parity", "--trials=3", "--storage=alone")[0] == 0
     assert [trial.digest for trial in store.results([])] == [trial.digest for trial in alone.results([])]
 
 
@@ -346,7 +346,7 @@ def test_a_killed_workers_batch_is_done_again_and_nothing_is_lost_or_twice(evocl
 @pytest.mark.usefixtures("deadly")
 def test_a_batch_that_kills_every_process_fails_with_the_reason_and_the_rest_is_done(evoclaims: Evoclaims) -> None:
     Path("deaths").write_text("99")
-    status, _, err = evoclaims("run", "--numprocesses=2", "--trials=2")
+    status, _, err = evoclaims("run", "--on=parity", "--numprocesses=2", "--trials=2")
     assert status == 1
     assert "killed on parity (smoke) failed: its process died (SIGKILL: the system sends that where" in err
     assert "1 of 3 conditions failed." in err

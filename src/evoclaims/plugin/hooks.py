@@ -32,7 +32,7 @@ from evoclaims.plugin.progress import QUIET, ProgressLine, progress_of
 from evoclaims.plugin.start import prepare
 from evoclaims.plugin.summary import COLLECTED, KNOWN, TROUBLE, Summary
 from evoclaims.trials.gpus import gpus
-from evoclaims.trials.stopping import end_without, interrupted_by
+from evoclaims.trials.stopping import end_without, interrupted_by, only_told
 
 if TYPE_CHECKING:
     from evoclaims.claims.claim import ClaimTest
@@ -266,11 +266,26 @@ def pytest_collection_finish(session: pytest.Session) -> None:
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, object]:
-    """While claims run, let Ctrl-C interrupt them wherever they are (see `interrupted_by`)."""
+    """While claims run, let Ctrl-C interrupt them wherever they are (see `interrupted_by`); afterwards nothing."""
     if not any(item.get_closest_marker("claim") for item in session.items):
         return (yield)
+    _let_end(session.config)  # first: it comes into force when the block below has ended, without a gap
     with interrupted_by(signal.SIGINT):
         return (yield)
+
+
+def _let_end(config: pytest.Config) -> None:
+    """Let Ctrl-C only be answered until pytest has ended: it would be a traceback, and the verdicts would be lost."""
+    reporter: Any = config.pluginmanager.get_plugin("terminalreporter")  # none in a worker of xdist
+
+    def answer() -> None:
+        text = "\nevoclaims: the run is ending; what has run is kept.\n"
+        with suppress(AttributeError, OSError, ValueError):  # not by the writer: it may be in the middle of a line
+            os.write(reporter._tw._file.fileno(), text.encode())
+
+    held = only_told(signal.SIGINT, answer)
+    held.__enter__()
+    config.add_cleanup(lambda: held.__exit__(None, None, None))
 
 
 @pytest.hookimpl(tryfirst=True)
