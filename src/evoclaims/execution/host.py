@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from evoclaims.core.errors import UserError
-from evoclaims.trials import devices, gpus
+from evoclaims.trials import gpus
 
 AUTO: Final = 0
 """As many processes as are useful."""
@@ -56,5 +56,7 @@ def host_of(numprocesses: str, device: str, option: str = "--numprocesses") -> H
     """
     host = Host(processes_of(numprocesses, option), gpus.gpus(device))
     if host.gpus and not host.alone:
+        from evoclaims.trials import devices  # here, since it imports jax: pytest checks an option with this module
+
         devices.keep_off_gpus()
     return host

@@ -234,12 +234,19 @@ def _ahead(config: pytest.Config, reproduction: Reproduction, store: Store, limi
 
 def import_from_root(config: pytest.Config) -> None:
     """Let claim files import the project's modules, as they can where a command collects them."""
-    path = config.rootpath / "pyproject.toml"
-    with contextlib.suppress(OSError, ValueError, UserError):  # an unreadable file is reported later
-        if "evoclaims" in read_text(path):  # other projects import nothing for it
-            from evoclaims.paper.config import load_config, make_importable
+    if names_us(config):  # other projects import nothing for it
+        from evoclaims.paper.config import load_config, make_importable
 
+        with contextlib.suppress(UserError):  # an unreadable file is reported later
             make_importable(load_config(config.rootpath).root)
+
+
+def names_us(config: pytest.Config) -> bool:
+    """Whether the settings of the project name evoclaims: it may have claims."""
+    try:
+        return "evoclaims" in read_text(config.rootpath / "pyproject.toml")
+    except (OSError, ValueError, UserError):
+        return False
 
 
 def _storage(config: pytest.Config) -> Path:
