@@ -484,6 +484,23 @@ def test_a_trial_that_crashes_in_a_worker_is_run_once_and_its_claim_says_so(
         assert "1 of 6 trials of better on small crashed (seed 3)" in report.reason
 
 
+def test_an_interrupt_before_anything_has_begun_in_processes_ends_the_run(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def start(thread: object) -> None:
+        raise KeyboardInterrupt
+
+    better = _pair(session)[0].condition
+    order = WorkOrder(str(session.store.root), "", "cpu", 0, 0)
+    ahead = Ahead(Host(2, ()), order, session.reproduction, session.store, 1e9, print)
+    works = {better.id: Work(("better", "small"), ("smoke",), "", 0, {0: ""}, COST)}
+    with monkeypatch.context() as patch:
+        patch.setattr("threading.Thread.start", start)
+        with pytest.raises(KeyboardInterrupt):
+            ahead.start(Workload("", {"claim": tuple(works)}, works), {"smoke": range(6)})
+    ahead.stop()
+
+
 @pytest.mark.parametrize("more", [0, 95])
 def test_a_tier_refuses_trials_for_drift_that_cannot_be_compared(session: Session, more: int) -> None:
     with pytest.raises(UserError, match=f"for_drift={more} more trials of better on small"):

@@ -204,6 +204,15 @@ def test_an_error_that_ends_all_leaves_no_process_behind(run: Run, monkeypatch: 
     assert closed == ["0"]
 
 
+def test_an_interrupt_before_a_thread_has_started_ends_all(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    def start(thread: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("threading.Thread.start", start)
+    with pytest.raises(KeyboardInterrupt):
+        run([["a"]], [_gpu("0"), _gpu("1")])
+
+
 def test_a_condition_on_several_gpus_leaves_them_to_others_when_it_has_ended(run: Run) -> None:
     wide = Seat(gpus.only(["0", "1"]), Job("", "wide", "parity"), (_gpu("0"), _gpu("1")))
     ended, log = run(

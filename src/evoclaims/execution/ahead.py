@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 from evoclaims.claims.fetching import more_for_drift
@@ -141,7 +142,8 @@ class Ahead:
             if self._workers is not None:
                 self._workers.stop()
         if self._thread is not None:
-            self._thread.join()
+            with suppress(RuntimeError):  # an interrupt came before it was started
+                self._thread.join()
 
     def _planned(
         self, load: Workload, tier: str, seeds: Mapping[str, Sequence[int]], soonest: Sequence[str]
