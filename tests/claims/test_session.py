@@ -487,15 +487,16 @@ def test_a_trial_that_crashes_in_a_worker_is_run_once_and_its_claim_says_so(
 def test_an_interrupt_before_anything_has_begun_in_processes_ends_the_run(
     session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def start(thread: object) -> None:
-        raise KeyboardInterrupt
+    class Interrupted(threading.Thread):
+        def start(self) -> None:
+            raise KeyboardInterrupt
 
     better = _pair(session)[0].condition
     order = WorkOrder(str(session.store.root), "", "cpu", 0, 0)
     ahead = Ahead(Host(2, ()), order, session.reproduction, session.store, 1e9, print)
     works = {better.id: Work(("better", "small"), ("smoke",), "", 0, {0: ""}, COST)}
     with monkeypatch.context() as patch:
-        patch.setattr("threading.Thread.start", start)
+        patch.setattr("evoclaims.execution.ahead.threading.Thread", Interrupted)
         with pytest.raises(KeyboardInterrupt):
             ahead.start(Workload("", {"claim": tuple(works)}, works), {"smoke": range(6)})
     ahead.stop()
