@@ -55,7 +55,7 @@ def wall_time(folder: Path, processes: int) -> float:
     command = [sys.executable, "-c", "from evoclaims.cli import main; raise SystemExit(main())", "run", "--device=cpu"]
     began = time.perf_counter()
     subprocess.run(
-        [*command, f"--numprocesses={processes}", f"--storage=store{processes}"],
+        [*command, "--on=parity", f"--numprocesses={processes}", f"--storage=store{processes}"],
         cwd=folder,
         check=True,
         stdout=subprocess.DEVNULL,

@@ -21,7 +21,7 @@ def load(claims: Mapping[str, str], **seconds: float) -> Workload:
     """Return claims on conditions of one letter each."""
     costs = {name: Cost(0, took, 10, Layout.ALONE) for name, took in seconds.items()}
     works = {
-        name: Work((name, "task"), "smoke", name, 0, {0: "file"} if cost.work else {}, cost)
+        name: Work((name, "task"), ("smoke",), name, 0, {0: "file"} if cost.work else {}, cost)
         for name, cost in costs.items()
     }
     return Workload("store", {claim: tuple(needs) for claim, needs in claims.items()}, works)

@@ -57,7 +57,7 @@ def took(seconds: float, basis: Basis = "here") -> Cost:
 
 def work(name: str, stored: int, *missing: str, cost: Cost) -> Work:
     """Return a method on a task of the same name."""
-    return Work((name, name), "smoke", "", stored, dict(enumerate(missing)), cost)
+    return Work((name, name), ("smoke",), "", stored, dict(enumerate(missing)), cost)
 
 
 def watching(store: Store, workers: int = 2) -> Watching:

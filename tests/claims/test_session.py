@@ -388,9 +388,12 @@ def test_a_claim_whose_trials_are_there_is_judged_where_those_for_the_drift_chec
         store.record_path(TrialSpec(condition, seed).id, condition.versions).write_text("{")
         ahead = Ahead(Host(2, ()), WorkOrder(str(store.root), "", "cpu", 0, 0), session.reproduction, store, 1e9, print)
         ahead._errors[condition.id] = "the store is damaged"
-        for mode in (RunMissing(store, "cpu", ignore, wait=wait, for_drift=more) for wait in (_no_wait, ahead.wait)):
+        for wait in (_no_wait, ahead.wait):
+            mode = RunMissing(store, "cpu", ignore, wait=wait, for_drift=more)
             if whole:
                 assert [trial.seed for trial in mode(condition, range(6))] == [*range(6)]
+                # The drift check itself names a file that it cannot read.
+                assert mode.unmade == ({} if wait is _no_wait else {condition.id: "the store is damaged"})
             else:
                 with pytest.raises(UserError, match=r"it is not one whole JSON text|the store is damaged"):
                     mode(condition, range(6))
@@ -412,7 +415,7 @@ def test_trials_for_the_drift_check_are_asked_of_processes_on_cpus_alone(
         monkeypatch.setattr(
             Ahead, "_run", lambda self, runs: asked.extend(job for run in runs for job in run.conditions)
         )
-        works = {condition.id: Work(("better", "small"), "smoke", "", 0, dict.fromkeys(range(12), ""), COST)}
+        works = {condition.id: Work(("better", "small"), ("smoke",), "", 0, dict.fromkeys(range(12), ""), COST)}
         one = Ahead(Host(2, gpus), WorkOrder("", "", "cpu", 0, 0), paper, session.store, limit, print)
         one.start(Workload("", {"claim": (condition.id,)}, works), {"smoke": range(6)})
         one.stop()
@@ -444,7 +447,7 @@ def test_what_was_not_asked_for_beforehand_waits_for_gpus(
     monkeypatch.setattr(Workers, "run", run)
     order = WorkOrder(str(session.store.root), "", "cpu", 0, 0)
     ahead = Ahead(Host(2, gpus), order, session.reproduction, session.store, 1e9, print)
-    works = {better.id: Work(("better", "small"), "smoke", "", 0, dict.fromkeys(range(6), ""), COST)}
+    works = {better.id: Work(("better", "small"), ("smoke",), "", 0, dict.fromkeys(range(6), ""), COST)}
     ahead.start(Workload("", {"claim": tuple(works)}, works), {"smoke": range(6)})
     ahead.wait(worse, [0])
     judged.set()
@@ -471,7 +474,7 @@ def test_a_trial_that_crashes_in_a_worker_is_run_once_and_its_claim_says_so(
     monkeypatch.setattr(Workers, "run", run)
     order = WorkOrder(str(session.store.root), "", "cpu", 0, 0)
     ahead = Ahead(Host(2, ()), order, session.reproduction, session.store, 1e9, print)
-    works = {better.condition.id: Work(("better", "small"), "smoke", "", 0, dict.fromkeys(range(6), ""), COST)}
+    works = {better.condition.id: Work(("better", "small"), ("smoke",), "", 0, dict.fromkeys(range(6), ""), COST)}
     ahead.start(Workload("", {"claim": tuple(works)} if known else {}, works if known else {}), {"smoke": range(6)})
     running = replace(session, fetch=RunMissing(session.store, "cpu", ignore, wait=ahead.wait))
     for _ in range(2):
@@ -479,6 +482,24 @@ def test_a_trial_that_crashes_in_a_worker_is_run_once_and_its_claim_says_so(
         report = running.settle(ClaimTest(says, "smoke", ""), better.solves_every_level.in_most_trials())
         assert (report.outcome, ran) == ("error", [(*range(6),)])
         assert "1 of 6 trials of better on small crashed (seed 3)" in report.reason
+
+
+def test_an_interrupt_before_anything_has_begun_in_processes_ends_the_run(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Interrupted(threading.Thread):
+        def start(self) -> None:
+            raise KeyboardInterrupt
+
+    better = _pair(session)[0].condition
+    order = WorkOrder(str(session.store.root), "", "cpu", 0, 0)
+    ahead = Ahead(Host(2, ()), order, session.reproduction, session.store, 1e9, print)
+    works = {better.id: Work(("better", "small"), ("smoke",), "", 0, {0: ""}, COST)}
+    with monkeypatch.context() as patch:
+        patch.setattr("evoclaims.execution.ahead.threading.Thread", Interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            ahead.start(Workload("", {"claim": tuple(works)}, works), {"smoke": range(6)})
+    ahead.stop()
 
 
 @pytest.mark.parametrize("more", [0, 95])

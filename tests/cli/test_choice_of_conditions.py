@@ -36,6 +36,21 @@ def _out_of_time(variant: str, limit: float) -> None:
     project.store.put(make_unfinished(TrialSpec(condition, 0), "timeout", {}, timing, jax.devices("cpu")), {})
 
 
+def test_without_a_name_what_claims_need_runs_and_nothing_else(project: Any, evoclaims: Evoclaims) -> None:
+    left = "Left out: 2 conditions that no claim of the smoke tier needs; names select them, as in coin --on parity.\n"
+    _, out, _ = evoclaims("submit", "--dry-run", "--cluster=local")
+    assert out.startswith(f"{left}2 batches of the smoke tier")
+    status, out, _ = evoclaims("run", "--trials=1")
+    assert (status, out.startswith(left)) == (0, True)
+    ran = {result.spec["method"]["name"] for result in Store(Path(".evoclaims")).results([])}
+    assert ran == {"hand_built", "hand_built_negated"}
+    project.write("torn(")
+    status, _, err = evoclaims("run")
+    assert (status, err.count("Traceback")) == (2, 0)
+    assert "cannot be collected: " in err
+    assert err.endswith("Without claims only named conditions run, as in right --on parity.\n")
+
+
 def test_trials_of_a_variant_that_ran_out_of_less_time_are_counted_among_those_to_run(evoclaims: Evoclaims) -> None:
     _out_of_time("traded", 1.0)
     status, out, _ = evoclaims("run", "--variant=traded", "--trials=1")

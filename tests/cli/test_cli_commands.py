@@ -158,7 +158,12 @@ REPRODUCTION = replace(REPRODUCTION, tiers={"smoke": Tier(with_raising(1), Desig
 """
 
 
-def test_a_method_or_task_that_raises_is_a_sentence_and_the_other_conditions_run(evoclaims: Evoclaims) -> None:
+def test_a_method_or_task_that_raises_is_a_sentence_and_the_other_conditions_run(
+    project: Any, evoclaims: Evoclaims
+) -> None:
+    asked = {"b": ("leaving", "parity"), "c": ("broken", "parity"), "d": ("coin", "broken_parity")}
+    body = "verdict(trials('{}', on='{}').solves_every_level.in_most_trials())"
+    project.write(a="supported", **{name: body.format(*names) for name, names in asked.items()})
     reproduction = Path("tiny_paper.py")
     reproduction.write_text(reproduction.read_text() + RAISING)
     lines = reproduction.read_text().splitlines()

@@ -78,7 +78,8 @@ def test_a_figure_without_any_trial_is_written_and_ends_with_1(half: Evoclaims) 
     assert status == 1
     assert "not run" in Path("figures/full/fig2.svg").read_text()
     assert out.splitlines()[-1] == (
-        "Nothing could be drawn: of fig2 no trial of the full tier is at hand. `evoclaims run --tier full` runs them."
+        "Nothing could be drawn: of fig2 no trial of the full tier is at hand. `evoclaims run METHOD --on TASK --tier "
+        "full` runs them."
     )
 
 

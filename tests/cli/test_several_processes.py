@@ -204,6 +204,15 @@ def test_an_error_that_ends_all_leaves_no_process_behind(run: Run, monkeypatch: 
     assert closed == ["0"]
 
 
+def test_an_interrupt_before_a_thread_has_started_ends_all(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    def start(thread: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("threading.Thread.start", start)
+    with pytest.raises(KeyboardInterrupt):
+        run([["a"]], [_gpu("0"), _gpu("1")])
+
+
 def test_a_condition_on_several_gpus_leaves_them_to_others_when_it_has_ended(run: Run) -> None:
     wide = Seat(gpus.only(["0", "1"]), Job("", "wide", "parity"), (_gpu("0"), _gpu("1")))
     ended, log = run(
@@ -331,14 +340,14 @@ def deadly(project: Project) -> Project:
 @pytest.mark.usefixtures("deadly")
 def test_a_killed_workers_batch_is_done_again_and_nothing_is_lost_or_twice(evoclaims: Evoclaims) -> None:
     Path("deaths").write_text("1")
-    status, out, err = evoclaims("run", "--numprocesses=2", "--trials=3")
+    status, out, err = evoclaims("run", "--on=parity", "--numprocesses=2", "--trials=3")
     assert (status, err.count("it is begun again")) == (0, 1)
     assert "killed on parity: its process died (SIGKILL: the system sends that where memory runs out)" in err
     store, alone = Store(Path(".evoclaims")), Store(Path("alone"))
     assert len(store.ids()) == 9
     assert verify(store, repair=False) == []
     assert out.count("3 of 3 conditions have ended") == 1
-    assert evoclaims("run", "--trials=3", "--storage=alone")[0] == 0
+    assert evoclaims("run", "--on=parity", "--trials=3", "--storage=alone")[0] == 0
     assert [trial.digest for trial in store.results([])] == [trial.digest for trial in alone.results([])]
 
 
@@ -346,7 +355,7 @@ def test_a_killed_workers_batch_is_done_again_and_nothing_is_lost_or_twice(evocl
 @pytest.mark.usefixtures("deadly")
 def test_a_batch_that_kills_every_process_fails_with_the_reason_and_the_rest_is_done(evoclaims: Evoclaims) -> None:
     Path("deaths").write_text("99")
-    status, _, err = evoclaims("run", "--numprocesses=2", "--trials=2")
+    status, _, err = evoclaims("run", "--on=parity", "--numprocesses=2", "--trials=2")
     assert status == 1
     assert "killed on parity (smoke) failed: its process died (SIGKILL: the system sends that where" in err
     assert "1 of 3 conditions failed." in err

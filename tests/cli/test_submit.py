@@ -89,7 +89,7 @@ def test_a_site_says_in_two_lines_what_jobs_ask_for_and_options_come_first(
 
 
 def test_nothing_is_submitted_twice_and_what_failed_is_submitted_again(evoclaims: Evoclaims, slurm: StandIn) -> None:
-    status, out, _ = evoclaims("submit")
+    status, out, _ = evoclaims("submit", "--on=parity")
     assert (status, len(out.splitlines())) == (0, 8)
     assert "4 batches of the smoke tier in 4 jobs on SLURM, at most 4 at a time, each with 2:00:00 of time:" in out
     assert "sbatch --dependency=afterany:41 --wrap='pytest -m smoke --claims-stored" in out
@@ -104,7 +104,7 @@ def test_nothing_is_submitted_twice_and_what_failed_is_submitted_again(evoclaims
     assert lines[2].endswith(", smoke: out of memory on node8")
     assert lines[3].endswith(", smoke: it is no longer queued and has printed nothing")
     assert lines[4] == "1 queued, 1 running, 2 failed"
-    _, out, _ = evoclaims("submit")
+    _, out, _ = evoclaims("submit", "--on=parity")
     assert "queued already, as job 41_0" in out
     assert "running already, as job 41_1" in out
     assert "2 batches of the smoke tier" in out
@@ -150,14 +150,14 @@ def test_the_cores_of_a_job_are_told_and_asked_for(evoclaims: Evoclaims, slurm: 
 def test_only_what_is_missing_is_submitted(evoclaims: Evoclaims, slurm: StandIn) -> None:
     assert "Nothing to submit: no batch of the smoke tier is missing." in evoclaims("submit", "right")[1]
     assert not slurm.script.exists()
-    assert "2 batches of the smoke tier in 2 jobs" in evoclaims("submit")[1]  # neither right nor wrong
+    assert "2 batches of the smoke tier in 2 jobs" in evoclaims("submit", "--on=parity")[1]  # neither right nor wrong
 
 
 @pytest.mark.usefixtures("stored")
 def test_a_damaged_record_does_not_hide_what_has_become_of_jobs(evoclaims: Evoclaims, slurm: StandIn) -> None:
     record = next(iter(Store(Path(".evoclaims")).record_paths()))
     record.unlink()
-    assert evoclaims("submit")[0] == 0
+    assert evoclaims("submit", "--on=parity")[0] == 0
     record.write_bytes(b"torn")
     status, out, _ = evoclaims("jobs")
     assert status == 1

@@ -84,7 +84,7 @@ def _evoclaims(project: Project, *arguments: str) -> subprocess.CompletedProcess
 def test_the_command_ends_with_its_trials_timed_out(project: Project) -> None:
     """A loop in a program is in the test below: it keeps its device, so that a callback would never be called."""
     _stuck(project, "{'tracing': Tracing(), 'calling': Calling()}")
-    done = _evoclaims(project, "run", "--trials", "2", "--time-limit", LIMIT)
+    done = _evoclaims(project, "run", "--on", "parity", "--trials", "2", "--time-limit", LIMIT)
     assert done.returncode == 0, done.stderr
     lines = [line for line in done.stdout.splitlines() if line.startswith("  seed")]
     assert len(lines) == 4

@@ -58,10 +58,10 @@ def test_both_tiers_and_a_variant_run_in_processes(project: Any) -> None:
     assert result.parseoutcomes()["refuted"] == 2
 
 
-@pytest.mark.parametrize("processes", ["0", "many"])
-def test_a_number_that_is_none_is_refused(project: Any, sentence: Any, processes: str) -> None:
+@pytest.mark.parametrize(("processes", "more"), [("0", ()), ("many", ()), ("many", ("--collect-only",))])
+def test_a_number_that_is_none_is_refused(project: Any, sentence: Any, processes: str, more: tuple[str, ...]) -> None:
     project.write(a="supported")
-    result = project.run(f"--claims-processes={processes}", own_store=True)
+    result = project.run(f"--claims-processes={processes}", *more, own_store=True)
     assert result.ret == pytest.ExitCode.USAGE_ERROR
     sentence(result, "--claims-processes takes a number from 1 up, or auto")
 
@@ -78,21 +78,46 @@ def test_a_claim_whose_processes_die_is_an_error_and_the_others_are_judged(proje
     assert "claims: 1 supported, 1 error" in shown
 
 
-def test_ctrl_c_ends_the_processes(project: Any) -> None:
+ENDING = """
+import time
+from pathlib import Path
+import pytest
+
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish():
+    Path("ending").touch()
+    time.sleep(1)
+"""
+
+
+def until(file: str) -> None:
+    """Wait for a file."""
+    deadline = time.monotonic() + 120
+    while not Path(file).exists() and time.monotonic() < deadline:
+        time.sleep(0.05)
+
+
+def test_ctrl_c_ends_the_processes_and_another_keeps_pytest_from_no_end(project: Any) -> None:
     project.write(c="undecided")
+    (project.path / "conftest.py").write_text(ENDING)
     paper = project.path / "tiny_paper.py"
     slow = (
-        "    def init(self, key, task):\n        import os, time; Path('begun').write_text(str(os.getpid()))\n"
+        "    def init(self, key, task):\n        import os, time; Path('pid').write_text(str(os.getpid()))\n"
+        "        os.rename('pid', 'begun')\n"
         "        time.sleep(600)\n        return jnp.where"
     )
     paper.write_text(paper.read_text().replace("    def init(self, key, task):\n        return jnp.where", slow))
-    run = subprocess.Popen([sys.executable, "-m", "pytest", "--claims-processes=2", "-q"], stdout=subprocess.PIPE)
-    deadline = time.monotonic() + 120
-    while not (Path("begun").exists() and Path("begun").read_text()) and time.monotonic() < deadline:
-        time.sleep(0.05)
+    run = subprocess.Popen(
+        [sys.executable, "-m", "pytest", "--claims-processes=2", "-q"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+    )
+    until("begun")
+    run.send_signal(signal.SIGINT)
+    until("ending")
     run.send_signal(signal.SIGINT)
     output, _ = run.communicate(timeout=60)
     assert run.returncode == pytest.ExitCode.INTERRUPTED
     assert b"KeyboardInterrupt" in output
+    assert b"Traceback" not in output
+    assert output.count(b"evoclaims: the run is ending; what has run is kept.") == 1
     with pytest.raises(ProcessLookupError):
         os.kill(int(Path("begun").read_text()), 0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ import pytest
 from evoclaims.claims.workload import Watching, Workload
 from evoclaims.cli import main
 from evoclaims.core.errors import UserError
-from evoclaims.execution.ahead import Ahead
+from evoclaims.execution.ahead import Ahead, TierRun
 from evoclaims.plugin.progress import ProgressLine
 
 CLAIMS = """
@@ -98,6 +99,28 @@ def test_trials_for_the_drift_check_are_counted_where_they_are_made(
     for processes in ("2", "auto") if gpus else ("1", "2"):
         project.run(f"--claims-processes={processes}", own_store=True)
     assert seen == [trials] * 2
+
+
+@pytest.mark.parametrize(("smoke", "full"), [(20, 10), (10, 20)])
+def test_a_condition_of_both_tiers_is_planned_once_with_the_trials_of_both(
+    project: Any, monkeypatch: pytest.MonkeyPatch, smoke: int, full: int
+) -> None:
+    project.write(a="supported")
+    paper = project.path / "tiny_paper.py"
+    both = f'"smoke": Tier(conditions(1), Design.fixed({smoke})), "full": Tier(conditions(1), Design.fixed({full}))'
+    paper.write_text(re.sub(r'"smoke": Tier.*Design.fixed\(10\)\)(?=})', both, paper.read_text()))
+    planned: list[int] = []
+
+    def note(ahead: Ahead, runs: Sequence[TierRun]) -> None:
+        planned.extend(len(job.seeds) for run in runs for group in run.groups for job in group)
+
+    def begin(*_: object, **__: object) -> None:
+        raise UserError("no more is needed")
+
+    monkeypatch.setattr(Ahead, "_run", note)
+    monkeypatch.setattr(ProgressLine, "begin", begin)
+    project.run("-m", "smoke or full", "--claims-processes=2", own_store=True)
+    assert planned == [20]
 
 
 def test_a_log_without_a_terminal_has_one_line_about_the_progress_and_none_when_quiet(project: Any) -> None:

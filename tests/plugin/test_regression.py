@@ -224,7 +224,7 @@ def test_accepted_verdicts_that_are_torn_fail_the_run_and_hide_no_verdict(accept
     result = accepted.run()
     assert result.ret == 1
     sentence(result, "verdicts.toml holds no accepted verdicts: it is no whole TOML file")
-    result.stdout.fnmatch_lines(["claims: 1 supported, 1 inconclusive"])
+    result.stdout.fnmatch_lines(["claims: 1 supported, 1 inconclusive", "failed: what the error above says"])
 
 
 @pytest.mark.parametrize(

@@ -50,6 +50,12 @@ def test_each_line_names_what_there_is(
     assert shown[2].partition(": ")[2].startswith(lines[2])
 
 
+def test_a_run_that_an_error_fails_has_not_failed_at_nothing() -> None:
+    one, two = closing_lines([GREEN], [], [], errors=1), closing_lines([RED], [], [], errors=2)
+    assert one == ["failed: what the error above says", "changed: nothing", "next: what the error above says"]
+    assert two[0] == "failed: what 2 errors above say, G2 (refuted)"
+
+
 def test_many_failures_stay_on_a_line() -> None:
     many = [replace(RED, claim=f"G{number}", case="neat-hyperneat") for number in range(20)]
     shown = closing_lines(many, [one.name for one in many], [])

@@ -167,7 +167,7 @@ def test_a_run_of_hours_is_announced_with_what_is_unknown_of_it_and_a_short_one_
             name: Cost(0.0, 9e9, 10, layout, "budget") if took is None else Cost(1.0, took, 10, layout, "elsewhere")
             for name, took in seconds.items()
         }
-        works = {name: Work((name, "task"), "smoke", name, 0, {0: "file"}, cost) for name, cost in costs.items()}
+        works = {name: Work((name, "task"), ("smoke",), name, 0, {0: "file"}, cost) for name, cost in costs.items()}
         return beforehand(Workload("store", {}, works))
 
     assert announced() == announced(a=3_599.0) == announced(a=None) == announced(Layout.VECTOR, a=9_000.0) == ""

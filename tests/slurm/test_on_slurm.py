@@ -138,7 +138,7 @@ def paper(tmp_path: Path, cluster: Cluster) -> Callable[[float], Paper]:
 def locally(tmp_path_factory: pytest.TempPathFactory, cluster: Cluster) -> dict[str, str]:
     """The digests of the trials, by id, of one process."""
     local = Paper(tmp_path_factory.mktemp("local"), cluster, 0.0)
-    assert local("run")[0] == 0
+    assert local("run", "--on", "parity")[0] == 0
     found = local.digests()
     assert len(found) == CONDITIONS * TRIALS
     return found
@@ -148,12 +148,15 @@ def test_two_nodes_store_the_trials_of_a_local_run_each_once(
     paper: Callable[[float], Paper], locally: dict[str, str]
 ) -> None:
     one = paper(0.02)
-    assert "9 batches of the smoke tier in 9 jobs on SLURM, at most 8 at a time" in one("submit", "--dry-run")[1]
+    assert (
+        "9 batches of the smoke tier in 9 jobs on SLURM, at most 8 at a time"
+        in one("submit", "--on", "parity", "--dry-run")[1]
+    )
     assert one.jobs() == {}
-    status, said = one("submit", "--slurm", "comment=a test")
+    status, said = one("submit", "--on", "parity", "--slurm", "comment=a test")
     assert status == 0, said
     judge = said.rpartition("sbatch ")[2].rpartition(".")[0]
-    assert "Nothing to submit" in one("submit")[1]
+    assert "Nothing to submit" in one("submit", "--on", "parity")[1]
     assert "queued" in one("jobs")[1]
     assert len(one.jobs()) == CONDITIONS
     wrapped = judge.partition("--wrap=")[2].strip("'").replace("pytest", f"{sys.executable} -m pytest", 1)
@@ -165,7 +168,7 @@ def test_two_nodes_store_the_trials_of_a_local_run_each_once(
     assert set(one.put().values()) == {1}
     status, said = one("jobs")
     assert (status, said.splitlines()[-1]) == (0, "9 done")
-    assert "Nothing to submit" in one("submit")[1]
+    assert "Nothing to submit" in one("submit", "--on", "parity")[1]
     assert "collected 0 items" in (one.folder / "judged.out").read_text()  # this paper has no claims
 
 
@@ -173,7 +176,7 @@ def test_cancelled_requeued_preempted_and_killed_jobs_lose_and_repeat_nothing(
     paper: Callable[[float], Paper], locally: dict[str, str]
 ) -> None:
     one = paper(0.25)
-    assert one("submit")[0] == 0
+    assert one("submit", "--on", "parity")[0] == 0
     first, second = one.wait(lambda: len(at := one.running()) == 2 and sorted(at))
     array = first.partition("_")[0]
     one.cluster.ask("scancel", first, f"{array}_4", f"{array}_6")
@@ -196,7 +199,7 @@ def test_cancelled_requeued_preempted_and_killed_jobs_lose_and_repeat_nothing(
     for job in (second, *preempted, *lost):
         assert one.log(job).count("$ ") >= 2  # it was started again
 
-    assert "Submitted 3 jobs" in one("submit")[1]
+    assert "Submitted 3 jobs" in one("submit", "--on", "parity")[1]
     one.wait_for_jobs()
     assert one.digests() == locally
     assert set(one.put().values()) == {1}

@@ -15,7 +15,7 @@ from evoclaims.trials.progress import Watcher
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.runner import run
 from evoclaims.trials.spec import Condition, TrialSpec
-from evoclaims.trials.store import Store
+from evoclaims.trials.store import DamagedFileError, Store
 
 
 class NotStoredError(Exception):
@@ -63,6 +63,7 @@ class RunMissing:
         again: seeds run again because of their versions, by the condition's id; filled in as trials are fetched.
         for_drift: seeds of more trials, by the condition's id, that only the drift check reads; each is made once, with
             the claims' own (see `more`).
+        unmade: why those of a condition could not be made, by its id; filled in as trials are fetched.
     """
 
     store: Store
@@ -73,6 +74,7 @@ class RunMissing:
     wait: Callable[[Condition, Sequence[int]], None] = lambda condition, seeds: None
     again: dict[str, set[int]] = field(default_factory=dict, compare=False)
     for_drift: Mapping[str, range] = field(default_factory=dict, compare=False)
+    unmade: dict[str, str] = field(default_factory=dict, init=False, compare=False)
     _made: set[str] = field(default_factory=set, init=False, compare=False, repr=False)
 
     def check(self) -> None:
@@ -98,8 +100,11 @@ class RunMissing:
             self._made.add(condition.id)
             try:
                 return [result for result in self._results(condition, [*seeds, *more]) if result.seed not in more]
-            except UserError:  # in a store that cannot be written, say: the claims' own trials may all be there
-                pass
+            except UserError as error:  # in a store that cannot be written, say: the claims' own may all be there
+                results = self._results(condition, seeds)
+                if not isinstance(error, DamagedFileError):  # the drift check itself reads that file
+                    self.unmade[condition.id] = str(error)
+                return results
         return self._results(condition, seeds)
 
     def _results(self, condition: Condition, seeds: Sequence[int]) -> Sequence[TrialResult]:

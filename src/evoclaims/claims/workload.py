@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import pytest
@@ -30,7 +30,7 @@ class Work:
 
     Attributes:
         names: under which claims ask for it.
-        tier: of these claims.
+        tiers: of these claims; the names are those of the first.
         programs: what it has in common with conditions that probably share its compiled programs.
         stored: how many of its trials need not be run.
         missing: those that must be run: by seed, the file of the record, below the store's folder.
@@ -38,7 +38,7 @@ class Work:
     """
 
     names: Names
-    tier: str
+    tiers: tuple[str, ...]
     programs: str
     stored: int
     missing: Mapping[int, str]
@@ -70,6 +70,15 @@ class Workload:
     conditions: Mapping[str, Work]
 
 
+@dataclass
+class _Need:
+    """What claims ask of a condition: for which seeds, at which tiers, and as which group of the first of these."""
+
+    group: TrialGroup
+    tiers: dict[str, None] = field(default_factory=dict)
+    seeds: set[int] = field(default_factory=set)
+
+
 def workload(session: Session, tests: Mapping[pytest.Item, ClaimTest], platform: str | None = None) -> Workload | None:
     """Return what a run of these claim tests has to do; None for a session that runs nothing.
 
@@ -77,7 +86,7 @@ def workload(session: Session, tests: Mapping[pytest.Item, ClaimTest], platform:
     """
     if not isinstance(session.fetch, RunMissing):
         return None
-    claims, groups = dict[str, tuple[str, ...]](), dict[str, dict[str, tuple[TrialGroup, Sequence[int]]]]()
+    claims, needs = dict[str, tuple[str, ...]](), dict[str, _Need]()
     recorder = Recorder.of(session)
     once: dict[tuple[str, str], tuple[pytest.Item, ClaimTest]] = {}
     for item, test in tests.items():  # plugins may repeat tests
@@ -86,17 +95,18 @@ def workload(session: Session, tests: Mapping[pytest.Item, ClaimTest], platform:
         claims[item.nodeid] = ()
         with suppress(Exception):  # an error of a method or a task is reported when the claim is judged
             design = session.design(test.tier, third_look=test.third_look)
-            seeds, known = design.seeds(design.last.n), groups.setdefault(test.tier, {})
             needed = {group.fingerprint: group for group in _needed(session, recorder.call(item, test))}
             for condition, group in needed.items():
                 _ = group.condition.environment_steps
-                if condition not in known or len(known[condition][1]) < len(seeds):
-                    known[condition] = group, seeds
+                need = needs.setdefault(condition, _Need(group))
+                need.tiers.setdefault(test.tier)
+                need.seeds.update(design.seeds(design.last.n))
             claims[item.nodeid] = tuple(needed)
     platform = platform or devices.choose(session.fetch.device)[0].platform
     works: dict[str, Work] = {}
-    for tier, known in groups.items():
-        works |= _works(session, session.fetch, tier, known, platform)
+    for tier in session.reproduction.tiers:
+        of_tier = {condition: need for condition, need in needs.items() if next(iter(need.tiers)) == tier}
+        works |= _works(session, session.fetch, tier, of_tier, platform)
     return Workload(str(session.store.root.resolve()), claims, works)
 
 
@@ -114,23 +124,24 @@ def _works(
     session: Session,
     fetch: RunMissing,
     tier: str,
-    groups: Mapping[str, tuple[TrialGroup, Sequence[int]]],
+    needs: Mapping[str, _Need],
     platform: str,
 ) -> dict[str, Work]:
     """Look up what is known of conditions of a tier."""
-    wanted = {
-        name: Wanted((group.method, group.task), group.condition, [*seeds, *fetch.more(group.condition, seeds)])
-        for name, (group, seeds) in groups.items()
-    }
+    wanted: dict[str, Wanted] = {}
+    for name, need in needs.items():
+        group, seeds = need.group, sorted(need.seeds)
+        known = [*seeds, *fetch.more(group.condition, seeds)]
+        wanted[name] = Wanted((group.method, group.task), group.condition, known)
     store, paper = session.store, session.reproduction
     estimator = Estimator(store, paper, tier, platform, time_limit=fetch.time_limit, any_version=fetch.any_version)
     works = {}
     for name, owed in estimator.owed(wanted).items():
-        group, condition, seeds = groups[name][0], wanted[name].condition, wanted[name].seeds
+        names, condition = wanted[name].names, wanted[name].condition
         files = {seed: store.record_path(TrialSpec(condition, seed).id, condition.versions) for seed in owed.seeds}
         missing = {seed: str(path.relative_to(store.root)) for seed, path in files.items()}
-        stored, names = len(seeds) - len(missing), (group.method, group.task)
-        works[name] = Work(names, tier, condition.programs, stored, missing, owed.cost)
+        stored, tiers = len(wanted[name].seeds) - len(missing), tuple(needs[name].tiers)
+        works[name] = Work(names, tiers, condition.programs, stored, missing, owed.cost)
     return works
 
 

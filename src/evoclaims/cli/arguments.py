@@ -70,7 +70,10 @@ def _running(add: _Add) -> None:
     plan.add_argument("--like", metavar="KIND", help="use times of trials made on this device, such as 'NVIDIA H200'")
     plan.add_argument("--measure", action="store_true", help="time a few steps of conditions never run here")
 
-    text = "run missing trials and judge nothing; with --variant run what it changes, and show which verdicts change"
+    text = (
+        "run the missing trials that claims need, or of named conditions, and judge nothing; with --variant run what "
+        "it changes, and show which verdicts change"
+    )
     run = add("run", text)
     run.add_argument("method", nargs="?", help="only this method")
     run.add_argument("--on", metavar="TASK", help="only this task")
@@ -86,7 +89,8 @@ def _running(add: _Add) -> None:
 
     submit = add(
         "submit",
-        "submit a tier's missing batches as jobs of SLURM or of this machine; a queued or running batch is left out",
+        "submit the missing batches that a tier's claims need, or of named conditions, as jobs of SLURM or of this "
+        "machine; a queued or running batch is left out",
     )
     submit.add_argument("method", nargs="?", help="only this method")
     submit.add_argument("--on", metavar="TASK", help="only this task")

@@ -39,9 +39,12 @@ def main(options: argparse.Namespace) -> int:
             print(f"  {sentence}")
         shown += drawing.shown
     if not shown:
+        selected = f"--tier {options.tier} --variant {options.variant}"
+        if not options.variant:  # what no claim needs runs only by its names
+            selected = f"METHOD --on TASK --tier {options.tier}"
         print(
             f"Nothing could be drawn: of {', '.join(chosen)} no trial of the {options.tier} tier is at hand. "
-            f"`evoclaims run --tier {options.tier}{f' --variant {options.variant}' * bool(options.variant)}` runs them."
+            f"`evoclaims run {selected}` runs them."
         )
     return int(not shown)
 

@@ -60,8 +60,8 @@ def to_run(running: Execution, names: Sequence[Names]) -> list[Names]:
 def main(options: argparse.Namespace) -> int:
     """Run what is missing and list the trials; 1 when a condition failed, which does not stop the others."""
     project = open_project(options.storage)
-    reproduction, store = project.reproduction, project.store
-    tier, chosen = choose(reproduction, options)
+    store = project.store
+    tier, chosen = choose(project, options)
     n = options.trials if options.trials is not None else tier.design.last.n
     if not 1 <= n <= MAX_TRIALS:
         raise UserError(
@@ -81,7 +81,7 @@ def main(options: argparse.Namespace) -> int:
         print(f"{job.label} ({options.tier}): nothing to run: {where_from(wanted.pop(job))}")
     if options.retry:
         for condition in wanted.values():
-            store.forget_timeouts((TrialSpec(condition, seed).id for seed in seeds), condition.versions)
+            StoredTrials(store, condition).forget_timeouts(seeds)
     complete = {job for job, condition in wanted.items() if not StoredTrials(store, condition).missing(seeds)}
     failed = 0
     for ended in running.run(wanted, lambda text: print(f"  {text}", flush=True)):

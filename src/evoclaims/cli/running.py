@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from evoclaims.claims.fetching import RunMissing
@@ -16,22 +16,27 @@ from evoclaims.execution.host import Host
 from evoclaims.execution.job import Job, missing_batches
 from evoclaims.execution.worker import Ended, Opened, WorkOrder, run_jobs
 from evoclaims.execution.workers import Workers, in_queue, seats_of
-from evoclaims.paper.reproduction import Names, Reproduction, Tier
+from evoclaims.paper.reproduction import Names, Tier
+from evoclaims.report.formatting import plural
 from evoclaims.report.live_line import LiveLine, duration
 from evoclaims.trials import devices
 from evoclaims.trials.spec import Condition
 
 
-def choose(reproduction: Reproduction, options: argparse.Namespace) -> tuple[Tier, list[Names]]:
+def choose(project: Project, options: argparse.Namespace) -> tuple[Tier, list[Names]]:
     """Return the tier that options name, and which of its conditions they select; of a variant, what it changes.
+
+    Without any name these are what the tier's claims need, and it is said how many others there are.
 
     Raises:
         UserError: for an unknown name, and for conditions that the variant leaves as they are; it lists the known ones.
+            Without any name also when the claims cannot be collected.
     """
+    reproduction = project.reproduction
     tier = reproduction.tier(options.tier, options.variant)
     chosen = named(tier, options.method, options.on)
     if not options.variant:
-        return tier, chosen
+        return tier, chosen if options.method or options.on else _needed(project, options.tier, chosen)
     touched = reproduction.changed_by(options.variant, options.tier)
     chosen = [names for names in chosen if names in touched]
     if not chosen:
@@ -40,6 +45,24 @@ def choose(reproduction: Reproduction, options: argparse.Namespace) -> tuple[Tie
             f"{', '.join(sorted(' on '.join(names) for names in touched)) or 'none'}."
         )
     return tier, chosen
+
+
+def _needed(project: Project, tier: str, known: Sequence[Names]) -> list[Names]:
+    """Return the conditions that claims of a tier need; a claim whose test breaks needs what it has asked for."""
+    try:
+        (claims,) = project.collect([("", tier)])
+    except UserError as error:
+        example = f", as in {' --on '.join(known[0])}" * bool(known)
+        raise UserError(f"{error} Without claims only named conditions run{example}.") from error
+    needed = {names for one in claims for names in (one.groups or [(group.method, group.task) for group in one.asked])}
+    others = [names for names in known if names not in needed]
+    if others:
+        print(
+            f"Left out: {plural(len(others), 'condition')} that no claim of the {tier} tier needs; names select them, "
+            f"as in {others[0][0]} --on {others[0][1]}.",
+            flush=True,
+        )
+    return [names for names in known if names in needed]
 
 
 def named(tier: Tier, method: str | None, task: str | None) -> list[Names]:

@@ -48,7 +48,7 @@ def main(options: argparse.Namespace) -> int:
     """Submit what is missing and not submitted yet, and say which jobs that makes."""
     project = open_project(options.storage)
     request = requested(options, project.config.slurm)
-    tier, names = choose(project.reproduction, options)
+    tier, names = choose(project, options)
     by_id = {tier.condition(*pair).id: pair for pair in reversed(names)}  # two names may mean the same trials
     conditions = {Job("", *pair): tier.condition(*pair) for pair in by_id.values()}
     if options.dry_run:

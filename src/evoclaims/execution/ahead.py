@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 from evoclaims.claims.fetching import more_for_drift
@@ -99,7 +100,7 @@ class Ahead:
         soonest = load.claims.get(next(lacking, ""), ())
         runs, ends = list[TierRun](), dict[str, float]()
         for tier in seeds:
-            run = self._planned(load, tier, seeds[tier], soonest)
+            run = self._planned(load, tier, seeds, soonest)
             if run.seats:
                 runs.append(run)
                 ends |= run.ends(load, max(ends.values(), default=0.0))
@@ -141,13 +142,21 @@ class Ahead:
             if self._workers is not None:
                 self._workers.stop()
         if self._thread is not None:
-            self._thread.join()
+            with suppress(RuntimeError):  # an interrupt came before it was started
+                self._thread.join()
 
-    def _planned(self, load: Workload, tier: str, seeds: Sequence[int], soonest: Sequence[str]) -> TierRun:
-        """Return what is to be run of a tier: first what the soonest claim needs, then the longest."""
-        works = {name: work for name, work in load.conditions.items() if work.tier == tier}
+    def _planned(
+        self, load: Workload, tier: str, seeds: Mapping[str, Sequence[int]], soonest: Sequence[str]
+    ) -> TierRun:
+        """Return what is to be run by a tier's names: first what the soonest claim needs, then the longest.
+
+        What another tier needs, too, is run by the first tier, for both.
+        """
+        works = {name: work for name, work in load.conditions.items() if work.tiers[0] == tier}
         known, platform = self.reproduction.seeds_for_drift, self.platform
-        due = {name: {*seeds, *more_for_drift(known, name, seeds, self.limit, platform)} for name in works}
+        due = {name: {seed for one in work.tiers for seed in seeds[one]} for name, work in works.items()}
+        for name, read in due.items():
+            read.update(more_for_drift(known, name, [*read], self.limit, platform))
         asked = {name: tuple(seed for seed in work.missing if seed in due[name]) for name, work in works.items()}
         jobs = {Job("", *works[name].names, missing): name for name, missing in asked.items() if missing}
         batches = [MissingBatch(job, job.seeds, works[name].cost) for job, name in jobs.items()]

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from evoclaims.core.errors import UserError
-from evoclaims.trials import devices, gpus
+from evoclaims.trials import gpus
 
 AUTO: Final = 0
 """As many processes as are useful."""
@@ -34,18 +34,29 @@ class Host:
         return self.processes == 1 or (self.processes == AUTO and len(self.gpus) == 1)
 
 
-def host_of(numprocesses: str, device: str, option: str = "--numprocesses") -> Host:
-    """Return what may be used; if processes are to share GPUs, jax in this process keeps off these.
+def processes_of(numprocesses: str, option: str = "--numprocesses") -> int:
+    """Return how many processes are asked for (see `Host`).
 
     Raises:
-        UserError: for an invalid number of processes.
+        UserError: for an invalid number.
     """
     if numprocesses != "auto" and (not numprocesses.isdecimal() or int(numprocesses) < 1):
         raise UserError(
             f"{option} takes a number from 1 up, or auto (one for each GPU; without GPUs as many as the cores "
             f"are enough for), not {numprocesses!r}."
         )
-    host = Host(AUTO if numprocesses == "auto" else int(numprocesses), gpus.gpus(device))
+    return AUTO if numprocesses == "auto" else int(numprocesses)
+
+
+def host_of(numprocesses: str, device: str, option: str = "--numprocesses") -> Host:
+    """Return what may be used; if processes are to share GPUs, jax in this process keeps off these.
+
+    Raises:
+        UserError: for an invalid number of processes.
+    """
+    host = Host(processes_of(numprocesses, option), gpus.gpus(device))
     if host.gpus and not host.alone:
+        from evoclaims.trials import devices  # here, since it imports jax: pytest checks an option with this module
+
         devices.keep_off_gpus()
     return host

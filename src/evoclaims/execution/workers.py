@@ -304,7 +304,8 @@ class Workers:
             for process in self._processes:
                 process.stop()
         for thread in self._threads:
-            thread.join()
+            with contextlib.suppress(RuntimeError):  # an interrupt came before it was started
+                thread.join()
         for process in tuple(self._processes):  # those of threads that have failed
             self._dismiss(process)
 

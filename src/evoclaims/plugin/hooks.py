@@ -10,8 +10,8 @@ import inspect
 import os
 import signal
 import unittest
-from collections.abc import Callable, Generator, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from fnmatch import fnmatch
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -32,7 +32,7 @@ from evoclaims.plugin.progress import QUIET, ProgressLine, progress_of
 from evoclaims.plugin.start import prepare
 from evoclaims.plugin.summary import COLLECTED, KNOWN, TROUBLE, Summary
 from evoclaims.trials.gpus import gpus
-from evoclaims.trials.stopping import end_without, interrupted_by
+from evoclaims.trials.stopping import end_without, interrupted_by, only_told
 
 if TYPE_CHECKING:
     from evoclaims.claims.claim import ClaimTest
@@ -200,6 +200,15 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> Generator[None, object, 
     return made
 
 
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_collection(session: pytest.Session) -> Generator[None, object, object]:
+    """While claims are collected and prepared, which imports jax, let Ctrl-C interrupt that."""
+    if not options.names_us(session.config):
+        return (yield)
+    with _interrupted(session.config):
+        return (yield)
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(session: pytest.Session, config: pytest.Config, items: list[pytest.Item]) -> None:
     """Leave out other tiers and claims; the full tier is only kept when it was asked for by name."""
@@ -266,11 +275,46 @@ def pytest_collection_finish(session: pytest.Session) -> None:
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_runtestloop(session: pytest.Session) -> Generator[None, object, object]:
-    """While claims run, let Ctrl-C interrupt them wherever they are (see `interrupted_by`)."""
+    """While claims run, let Ctrl-C interrupt them wherever they are; afterwards the run ends, and nothing does."""
     if not any(item.get_closest_marker("claim") for item in session.items):
         return (yield)
+    with _interrupted(session.config):
+        try:
+            return (yield)
+        finally:
+            session.config.stash[_is_ending] = True
+
+
+_is_ending: pytest.StashKey[bool] = pytest.StashKey()
+"""Whether a run has nothing more to do but to end: known as soon as Ctrl-C can interrupt something."""
+
+
+@contextmanager
+def _interrupted(config: pytest.Config) -> Iterator[None]:
+    """Let Ctrl-C interrupt a `with` block wherever it is (see `interrupted_by`), and then nothing to the run's end.
+
+    A second one would be a traceback, and the verdicts would be lost: it is answered.
+    """
+    reporter: Any = config.pluginmanager.get_plugin("terminalreporter")  # none in a worker of xdist
+
+    def answer() -> None:
+        if not config.stash[_is_ending]:
+            raise KeyboardInterrupt
+        text = "\nevoclaims: the run is ending; what has run is kept.\n"
+        with suppress(AttributeError, OSError, ValueError):  # not by the writer: it may be in the middle of a line
+            os.write(reporter._tw._file.fileno(), text.encode())
+
+    if _is_ending not in config.stash:
+        config.stash[_is_ending] = False
+        until_the_end = ExitStack()
+        until_the_end.enter_context(only_told(signal.SIGINT, answer))
+        config.add_cleanup(until_the_end.close)
     with interrupted_by(signal.SIGINT):
-        return (yield)
+        try:
+            yield
+        except KeyboardInterrupt:
+            config.stash[_is_ending] = True
+            raise
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -87,9 +87,13 @@ def check(config: pytest.Config) -> None:
     Raises:
         pytest.UsageError: with a sentence.
     """
-    changes = config.getoption("claims_compare_fail")
+    changes, processes = config.getoption("claims_compare_fail"), config.getoption("claims_processes")
     try:
         _check_root(config)
+        if processes != "1":
+            from evoclaims.execution.host import processes_of
+
+            processes_of(processes, "--claims-processes")
         if changes is not None:
             _check_changes(config, changes)
         if config.getoption("claims_committed") and not config.getoption("claims_stored"):
@@ -230,12 +234,19 @@ def _ahead(config: pytest.Config, reproduction: Reproduction, store: Store, limi
 
 def import_from_root(config: pytest.Config) -> None:
     """Let claim files import the project's modules, as they can where a command collects them."""
-    path = config.rootpath / "pyproject.toml"
-    with contextlib.suppress(OSError, ValueError, UserError):  # an unreadable file is reported later
-        if "evoclaims" in read_text(path):  # other projects import nothing for it
-            from evoclaims.paper.config import load_config, make_importable
+    if names_us(config):  # other projects import nothing for it
+        from evoclaims.paper.config import load_config, make_importable
 
+        with contextlib.suppress(UserError):  # an unreadable file is reported later
             make_importable(load_config(config.rootpath).root)
+
+
+def names_us(config: pytest.Config) -> bool:
+    """Whether the settings of the project name evoclaims: it may have claims."""
+    try:
+        return "evoclaims" in read_text(config.rootpath / "pyproject.toml")
+    except (OSError, ValueError, UserError):
+        return False
 
 
 def _storage(config: pytest.Config) -> Path:

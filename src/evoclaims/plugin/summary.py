@@ -190,7 +190,7 @@ class Summary:
             terminalreporter.write_line(self._safe(f"error: {trouble}"), red=True)
         unsaved = sorted({report.unsaved for report in self.reports} - {""})
         warnings = [f"The files of evidence could not be written. {reason}" for reason in unsaved[:1]]
-        for warning in (*warnings, self._write_step_summary(notes)):
+        for warning in (*warnings, *self._unmade(), self._write_step_summary(notes)):
             if warning:
                 terminalreporter.write_line(self._safe(f"warning: {warning}"), yellow=True)
         if table_cells.faults(self.reports):
@@ -213,7 +213,19 @@ class Summary:
             regressed = [f"{one.claim} ({one.tier})" for one in self._regression.matched]
         drifted = [row.label for row in self._drift[0].rows if row.drifted] if self._drift else []
         drifted += self._upgrade.drifted if self._upgrade else []
-        return closing_lines(self.reports, changed, list(dict.fromkeys(drifted)), regressed)
+        return closing_lines(self.reports, changed, list(dict.fromkeys(drifted)), regressed, len(self._troubles))
+
+    def _unmade(self) -> list[str]:
+        """Say where the drift check lacks the trials that only it reads; the claims had theirs."""
+        from evoclaims.claims.session import SESSION
+
+        session = self._config.stash.get(SESSION, None)
+        unmade: dict[str, str] = getattr(session and session.fetch, "unmade", {})
+        labels = {source.condition: source.label for report in self.reports for source in report.sources}
+        return [
+            f"{labels.get(condition, condition)}: trials that only the drift check reads were not made. {why}"
+            for condition, why in unmade.items()
+        ]
 
     def _choices(self) -> str:
         """Say how claims are selected, where none was."""

@@ -58,6 +58,7 @@ def closing_lines(
     changed: Sequence[str] | None,
     drifted: Sequence[str],
     regressed: Sequence[str] = (),
+    errors: int = 0,
 ) -> list[str]:
     """Return three lines; the first names all that makes the run fail.
 
@@ -66,16 +67,18 @@ def closing_lines(
         changed: claims whose verdicts differ from the accepted ones; None if nothing has been accepted yet.
         drifted: conditions whose trials have drifted.
         regressed: those of `changed` that make the run fail.
+        errors: sentences above that make the run fail, too.
     """
     failed = [report for report in reports if report.failed]
     drifts = [f"trials of {label} (drift)" for label in drifted]
     changes = [*(changed or ()), *drifts]
     nothing = "nothing" if changed is not None else "nothing to compare with: no verdict has been accepted"
-    failures = [f"{one.name} ({one.outcome})" for one in failed]
+    above = ["what the error above says" if errors == 1 else f"what {errors} errors above say"] * bool(errors)
+    failures = [*above, *(f"{one.name} ({one.outcome})" for one in failed)]
     return [
         _line("failed: ", [*failures, *(f"{name}, regression" for name in regressed), *drifts], "nothing"),
         _line("changed: ", changes, nothing),
-        f"next: {_next(failed, changes, changed is None)}",
+        f"next: {above[0] if above else _next(failed, changes, changed is None)}",
     ]
 
 

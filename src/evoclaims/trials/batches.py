@@ -80,6 +80,16 @@ class StoredTrials:
                 if (result := self.get(seed)) is not None:
                     yield result
 
+    def forget_timeouts(self, seeds: Sequence[int]) -> None:
+        """Let those of these trials that ran out of time be run again, with as much time as a new batch.
+
+        Raises:
+            StorageError: when a record cannot be removed.
+        """
+        late = {result.seed for result in self.sound(seeds) if result.status == "timeout"}
+        checkpoint.renew(self.store.checkpoints, self.condition.id, late)  # first: it could not be repeated
+        self.store.forget_timeouts((TrialSpec(self.condition, seed).id for seed in late), self.condition.versions)
+
     def answer(self, results: Iterable[TrialResult | None]) -> bool:
         """Whether none of these trials must be run."""
         return all(answers(result, self.time_limit) for result in results)
@@ -285,6 +295,7 @@ def halved(run: Run, tried: Header) -> int:
             _save(run, header, state, left[:half])
             now = datetime.now(UTC).isoformat()  # the second half begins anew: what both have had counts once
             anew = replace(header, started=now, run_seconds=0.0, compile_seconds=0.0, processor_seconds=0.0)
+            anew = replace(anew, spent_seconds=0.0)
             _save(run, anew, state, left[half:])
             checkpoint.remove(run.store.checkpoints, header)
     return half

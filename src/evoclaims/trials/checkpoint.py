@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import contextlib
 import json
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Container, Iterator, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 import jax
 import numpy as np
 from msgspec import convert
+from numpy.typing import NDArray
 
 from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UserError
@@ -46,6 +47,7 @@ class Header:
         started: when the batch began (UTC, ISO 8601).
         versions: hash of the versions that the condition depends on (`packages.short_hash`); empty in old checkpoints.
         schema: version of this format.
+        spent_seconds: of the time that a batch may take, so far; not counted in old checkpoints, nor without a limit.
     """
 
     condition: str
@@ -60,6 +62,7 @@ class Header:
     versions: str = ""
     schema: int = SCHEMA
     processor_seconds: float = 0.0
+    spent_seconds: float = 0.0
 
     @property
     def seeds(self) -> list[int]:
@@ -74,9 +77,12 @@ def path_of(folder: Path, header: Header) -> Path:
 
 def save(folder: Path, header: Header, state: TrialState) -> None:
     """Write header and state (on the host, leaves [lanes, …]) in one atomic step."""
-    arrays = {f"{i:04d}": np.asarray(leaf) for i, leaf in enumerate(jax.tree.leaves(state))}
-    arrays[_HEADER] = np.frombuffer(_text(header).encode(), dtype=np.uint8)
-    write_atomically(path_of(folder, header), pack(arrays), ELSEWHERE)
+    _write(folder, header, {f"{i:04d}": np.asarray(leaf) for i, leaf in enumerate(jax.tree.leaves(state))})
+
+
+def _write(folder: Path, header: Header, arrays: Mapping[str, NDArray[Any]]) -> None:
+    text = np.frombuffer(_text(header).encode(), dtype=np.uint8)
+    write_atomically(path_of(folder, header), pack({**arrays, _HEADER: text}), ELSEWHERE)
 
 
 def _text(header: Header) -> str:
@@ -101,6 +107,15 @@ def sound_ones(folder: Path, condition: str) -> list[Header]:
         with contextlib.suppress(DamagedFileError):
             headers.append(_header(path))
     return [header for header in headers if header is not None]
+
+
+def renew(folder: Path, condition: str, seeds: Container[int]) -> None:
+    """Let a condition's batches that have one of these seeds take all their time once more."""
+    unusable = contextlib.suppress(FileNotFoundError, _OtherSchemaError, DamagedFileError)
+    for path in sorted(folder.glob(f"{condition}-*.npz")):
+        with unusable, _opened(path) as (header, packed):
+            if header.spent_seconds and any(seed in seeds for seed in header.seeds):
+                _write(folder, replace(header, spent_seconds=0.0), packed)
 
 
 def newest(folder: Path, header: Header) -> Header | None:

@@ -63,9 +63,9 @@ def run(
     Each trial is stored as soon as it ends. A kill loses at most the time since the last checkpoint, from which the
     same call resumes with the same bits (on the same kind of device and versions).
 
-    A batch that takes longer than `time_limit` (seconds, on the device and compiling) ends there: its trials are stored
-    as "timeout" with their curves so far, and run again only when a call allows more. With a limit the work is done on
-    another thread, since it may never return (see `stopping.Allowance`).
+    A batch that takes longer than `time_limit` (seconds, on the device and compiling, in all calls together) ends
+    there: its trials are stored as "timeout" with their curves so far, and run again only when a call allows more. With
+    a limit the work is done on another thread, since it may never return (see `stopping.Allowance`).
 
     A batch that the device's memory does not hold goes on in two halves (see `batches.halved`).
 
@@ -146,11 +146,12 @@ def _finish_all(run: Run, owed: Sequence[int]) -> Header | None:
 
 def _finish(run: Run, header: Header, begin: Callable[[], Batch | None]) -> None:
     """Run a batch until all its trials are stored or its time is over."""
-    allowance, strides = Allowance(run.stored.time_limit), Strides()
+    allowance, strides = Allowance(run.stored.time_limit - header.spent_seconds), Strides()
     try:
         begun = allowance.spend(begin)
         if begun is None:
             return  # another process finished the batch; `run` restarts what is not stored
+        allowance.left -= begun.header.spent_seconds - header.spent_seconds  # another process went on with it meanwhile
         batch, header = begun, begun.header
         rhythm = Rhythm(run.checkpoint_seconds)
         with postponed() as stop:
@@ -161,7 +162,7 @@ def _finish(run: Run, header: Header, begin: Callable[[], Batch | None]) -> None
                 stopped = stop.is_set()
                 if batch.owed and (late or stopped or rhythm.due):
                     with rhythm.saving():
-                        _save(run, batch)
+                        _save(run, batch, allowance)
                 if progress is not None:
                     run.watch(progress)
                 if late:
@@ -186,10 +187,11 @@ def _go_on(run: Run, batch: Batch, allowance: Allowance, strides: Strides) -> tu
     return _rearranged(run, batch) if ended else batch, progress
 
 
-def _save(run: Run, batch: Batch) -> None:
-    spent = batch.header.compile_seconds + run.lanes.seconds
-    state = run.lanes.gather(batch.state)
-    checkpoint.save(run.store.checkpoints, replace(batch.header, compile_seconds=spent), state)
+def _save(run: Run, batch: Batch, allowance: Allowance) -> None:
+    header = replace(batch.header, compile_seconds=batch.header.compile_seconds + run.lanes.seconds)
+    if math.isfinite(allowance.left):
+        header = replace(header, spent_seconds=run.stored.time_limit - allowance.left)
+    checkpoint.save(run.store.checkpoints, header, run.lanes.gather(batch.state))
 
 
 def _advance(run: Run, batch: Batch, allowance: Allowance, strides: Strides) -> tuple[Batch, Report, bool]:

@@ -56,6 +56,20 @@ def interrupted_by(number: signal.Signals) -> Iterator[None]:
 
 
 @contextmanager
+def only_told(number: signal.Signals, tell: Callable[[], object]) -> Iterator[None]:
+    """Let a signal interrupt nothing in a `with` block, where what was begun ends soon; `tell` is called instead."""
+    before = signal.getsignal(number)
+    if before in (signal.SIG_IGN, None) or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    signal.signal(number, lambda *_: tell())
+    try:
+        yield
+    finally:
+        signal.signal(number, before)
+
+
+@contextmanager
 def postponed() -> Iterator[threading.Event]:
     """Hold such a signal back for a `with` block, which is given the event that says that one has come.
 
