@@ -18,7 +18,7 @@ import pytest
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.envs.foreign.brax_task import BraxTask
 from evoclaims.envs.foreign.gymnax_task import GymnaxTask
-from evoclaims.envs.foreign.jax_task import Choice, Descriptor, Range, actions_of
+from evoclaims.envs.foreign.jax_task import Choice, Descriptor, Moment, Range, actions_of
 from evoclaims.methods.cma_es import CmaEs
 from evoclaims.methods.map_elites import MapElites
 from evoclaims.methods.neat.evolution import Neat
@@ -175,6 +175,31 @@ def test_a_number_that_is_not_finite_ends_the_episode() -> None:
     assert (broken.observation == start.observation).all()
     for before, after in zip(*map(jax.tree.leaves, (start.inner.state, broken.inner.state)), strict=True):
         assert np.array_equal(before, after, equal_nan=True)
+
+
+@pytest.mark.parametrize("how", ["truncated", "reward", "observation"])
+def test_a_policy_scores_the_same_in_both_examinations(how: str) -> None:
+    class Ending(BraxTask):
+        def begin(self, key: Any) -> Any:
+            moment = super().begin(key)
+            return replace(moment, state=jnp.int32(0))
+
+        def advance(self, key: Any, state: Any, action: Any) -> Any:
+            over = state >= 3  # after the fourth step, and, where nobody stops there, ever after
+            changed = {
+                "truncated": {"truncated": over},
+                "reward": {"reward": jnp.where(over, jnp.inf, 1.0)},
+                "observation": {"observation": jnp.where(over, jnp.nan, jnp.zeros(2))},
+            }[how]
+            plain = {"observation": jnp.zeros(2), "reward": jnp.float32(1.0), "truncated": jnp.zeros((), bool)}
+            return Moment(state=state + 1, terminated=jnp.zeros((), bool), **{**plain, **changed})
+
+    task = Ending("fast", episode_steps=12, examined_episodes=2, solved_at=3.0)
+    compiled = task.examine(lambda observation: jnp.zeros(1), jax.random.key(0), jnp.int32(0))
+    fitness, success, metrics = task.examine_natively(lambda observation: np.zeros(1), 0)
+    assert fitness == (4.0 if how == "truncated" else 3.0) == compiled.fitness
+    assert success == 1.0 == compiled.success
+    assert metrics == {"episode_steps": 4.0} == compiled.metrics
 
 
 def test_wrong_names_and_what_map_elites_needs_are_sentences() -> None:

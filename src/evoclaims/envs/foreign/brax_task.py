@@ -28,7 +28,7 @@ class BraxTask(JaxTask):
         settings: its further arguments.
     """
 
-    revision: ClassVar[int] = 1
+    revision: ClassVar[int] = 2
     packages: ClassVar[tuple[str, ...]] = ("brax", "mujoco", "mujoco-mjx")
 
     settings: Mapping[str, Any] = field(default_factory=dict, hash=False, kw_only=False)
