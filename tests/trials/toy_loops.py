@@ -33,7 +33,7 @@ class Nowhere:
 
 
 def in_every_way(task: Any, seed: int, budget: Any, report: Callable[..., None]) -> Mapping[str, float]:
-    """Return a metric (seed 0), raise (1), be killed (2), return a NaN (3), report one between points (4)."""
+    """Return a metric (seed 0), raise (1), be killed (2), return a NaN (3) or infinity (5), report a NaN on the way (4)."""
     for step in range(0, budget.environment_steps + 1, 10):
         report(step, fitness=float("nan") if (seed, step) == (4, 50) else seed + step / 100)
     print("what it prints is no answer")
@@ -41,8 +41,8 @@ def in_every_way(task: Any, seed: int, budget: Any, report: Callable[..., None])
         raise ValueError("the reactor is \x1b[31mred")
     if seed == 2:
         os.kill(os.getpid(), signal.SIGSEGV)
-    fitness = float("nan") if seed == 3 else 7.5
-    return {"last_fitness": fitness, "found": float("inf"), "jax": "jax" in sys.modules}
+    fitness = {3: float("nan"), 5: float("inf")}.get(seed, 7.5)
+    return {"last_fitness": fitness, "jax": "jax" in sys.modules}
 
 
 class Tensor:
@@ -81,7 +81,7 @@ def in_odd_ways(task: Any, seed: int, budget: Any, report: Callable[..., None], 
     if seed == 0:
         for step in (30, 50, 55):
             report(step, fitness=Tensor())
-        return {"last_fitness": Tensor(), "clip": clip}
+        return {"last_fitness": Tensor(), "unbounded": clip == float("inf")}
     if seed == 1:
         report(2**60, fitness=1.0)
     if seed == 2:

@@ -65,6 +65,14 @@ def test_it_has_the_environment_s_sizes_and_limit() -> None:
     assert (several.observation_size, several.action_size) == (45, 2)
 
 
+@pytest.mark.parametrize("wrong", [0, -1])
+def test_an_episode_has_a_step(wrong: int) -> None:
+    with pytest.raises(UserError, match=f"CartPole-v1's episode_steps must be at least 1, not {wrong}"):
+        GymnasiumTask("CartPole-v1", episode_steps=wrong)
+    with pytest.raises(UserError, match="CartPole-v1's episode_steps must be a whole number, not 2.5"):
+        GymnasiumTask("CartPole-v1", episode_steps=2.5)  # type: ignore[arg-type]
+
+
 def trains(task: Any, seed: int, budget: Any) -> Any:
     raise AssertionError("no training begins")
 

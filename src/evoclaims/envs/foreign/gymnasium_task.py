@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
-from evoclaims.core.errors import UserError
+from evoclaims.core.errors import UserError, require_at_least
 from evoclaims.envs.base import Task
 from evoclaims.envs.foreign.native_actions import native_action
 from evoclaims.envs.foreign.scoring import ForeignTask, Scored
@@ -38,6 +38,12 @@ class GymnasiumTask(ForeignTask):
     settings: Mapping[str, Any] = field(default_factory=dict, hash=False, kw_only=False)
     episode_steps: int | None = None
     providers: tuple[str, ...] = field(default=(), metadata={"canonical": False})
+
+    def __post_init__(self) -> None:
+        """Check the counts."""
+        super().__post_init__()
+        if self.episode_steps is not None:  # Gymnasium takes -1 for none
+            require_at_least(1, f"{self.name}'s", episode_steps=self.episode_steps)
 
     @property
     def packages(self) -> tuple[str, ...]:

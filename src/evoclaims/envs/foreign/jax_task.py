@@ -21,7 +21,7 @@ from evoclaims.core.foreign import implicit_promotions
 from evoclaims.core.keys import EVALUATION, streams, trial_key
 from evoclaims.core.pytree import pytree, select, strong
 from evoclaims.envs.base import Episode, PolicyFn, TaskState, averaged, fitting, played
-from evoclaims.envs.foreign.native_actions import choice
+from evoclaims.envs.foreign.native_actions import array_action, choice
 from evoclaims.envs.foreign.scoring import ForeignTask, Scored
 
 
@@ -284,8 +284,10 @@ class JaxTask(ForeignTask):
         """Run `examined_episodes` of a policy that acts as the environment wants it, on the host, and average."""
         begin, actions = jax.jit(self.begin), self.actions
 
-        def native(action: Any) -> Array:
-            return jnp.asarray(choice(action, 0, actions.size, self.name) if isinstance(actions, Choice) else action)
+        def native(action: Any) -> Any:
+            if isinstance(actions, Choice):
+                return choice(action, 0, actions.size, self.name)
+            return array_action(actions.shape, action, self.name)
 
         @jax.jit
         def advance(key: Array, state: Any, action: Array, steps: Array) -> Moment:
@@ -296,7 +298,7 @@ class JaxTask(ForeignTask):
             moment, total = begin(begin_key), 0.0
             for step in count(1):
                 key, step_key = jax.random.split(key)
-                action = native(policy(np.asarray(moment.observation)))
+                action = jnp.asarray(native(policy(np.asarray(moment.observation))))
                 moment = advance(step_key, moment.state, action, np.int32(step))
                 total += float(moment.reward)
                 if moment.terminated or moment.truncated:
