@@ -221,7 +221,9 @@ def test_built_in_robots_that_move_in_a_plane_are_refused_in_a_maze(robot: Robot
 @pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS)
 def test_robots_that_could_walk_around_obstacles_are_refused_there(robot: Robot) -> None:
     if robot in IN_A_MAZE:
-        with pytest.raises(UserError, match=f"no walls at the ends of its obstacles, and the robot {robot.name} could walk"):
+        with pytest.raises(
+            UserError, match=f"no walls at the ends of its obstacles, and the robot {robot.name} could walk"
+        ):
             Obstacles(robot=robot)
     else:
         moved = replace(robot, start=(8.0, *[0.0] * (Scene(robot).model.nq - 1)))  # no longer as it is built in

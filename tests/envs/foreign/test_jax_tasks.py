@@ -205,7 +205,9 @@ def test_a_policy_scores_the_same_in_both_examinations(how: str) -> None:
 def test_a_policy_of_a_training_loop_returns_as_many_numbers_as_an_action_has() -> None:
     assert FAST.examine_natively(lambda observation: [[0.5]], 0)[2]["episode_steps"] > 0
     for wrong in ([0.5, 0.5], [], None, "up"):
-        with pytest.raises(UserError, match=r"returned .* on fast, where an action is an array of shape \(1,\)\. Return"):
+        with pytest.raises(
+            UserError, match=r"returned .* on fast, where an action is an array of shape \(1,\)\. Return"
+        ):
             FAST.examine_natively(lambda observation, wrong=wrong: wrong, 0)
 
 
