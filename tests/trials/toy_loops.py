@@ -33,7 +33,7 @@ class Nowhere:
 
 
 def in_every_way(task: Any, seed: int, budget: Any, report: Callable[..., None]) -> Mapping[str, float]:
-    """Return a metric (seed 0), raise (1), be killed (2), return a NaN (3) or infinity (5), report a NaN on the way (4)."""
+    """Return a metric (seed 0), raise (1), be killed (2), return a NaN (3), report one (4), return an infinity (5)."""
     for step in range(0, budget.environment_steps + 1, 10):
         report(step, fitness=float("nan") if (seed, step) == (4, 50) else seed + step / 100)
     print("what it prints is no answer")

@@ -40,7 +40,7 @@ def require_known(kind: str, name: object, known: Collection[object]) -> None:
 
 
 def require_at_least(least: int, whose: str, **counts: object) -> None:
-    """Raise a `UserError`, such as "PPO's minibatches must be at least 1, not 0.", for all but whole numbers from there."""
+    """Raise a `UserError`, such as "PPO's minibatches must be at least 1, not 0.", but for whole numbers from there."""
     for name, count in counts.items():
         if not isinstance(count, Integral):
             raise UserError(f"{whose} {name} must be a whole number, not {count!r}.")

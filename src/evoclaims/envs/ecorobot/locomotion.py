@@ -99,7 +99,7 @@ class Obstacles(RobotTask):
             self._require_plane()
 
     def _require_plane(self) -> None:
-        """Check that the robot starts before the obstacles, and its torso only moves along x and z and turns about y."""
+        """Check that the robot starts before the obstacles, and that its torso stays in the plane y = 0."""
         model, name = self.scene.whole, self.robot.name
         data = mujoco.MjData(model)
         data.qpos[:] = self.scene.start

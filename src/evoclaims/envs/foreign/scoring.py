@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from statistics import fmean
 from typing import Any, ClassVar
 
-from evoclaims.core.errors import require_at_least, require_finite
+from evoclaims.core.errors import require_at_least
 
 Scored = tuple[float, float, Mapping[str, float]]
 """Fitness, success and metrics of a policy, as a task's `examine` has them."""
@@ -35,10 +35,8 @@ class ForeignTask(ABC):
     solved_at: float | None = None
 
     def __post_init__(self) -> None:
-        """Check the numbers."""
+        """Check the count."""
         require_at_least(1, f"{self.name}'s", examined_episodes=self.examined_episodes)
-        if self.solved_at is not None:
-            require_finite(f"{self.name}'s", solved_at=self.solved_at)
 
     @property
     def name(self) -> str:
