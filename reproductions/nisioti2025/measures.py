@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from evoclaims import Event, Measure, Profile, TrialGroup
-from evoclaims.core.errors import require_finite
 from evoclaims.envs import Circuit
 
 
@@ -77,13 +76,11 @@ class PaperTrials(TrialGroup):
 
     def crosses(self, stones: float) -> Event:
         """The final policy crosses exactly `stones` stones in every episode."""
-        require_finite("An event's", stones=stones)
-        return self.event(f"crosses {stones:g} stones", lambda t: t.metrics["stones"] == stones)
+        return self.event(f"crosses {stones:g} stones", lambda t: t.metrics["stones"] == stones, stones=stones)
 
     def crosses_at_most(self, stones: float) -> Event:
         """The final policy crosses at most `stones` stones, averaged over the examination's episodes."""
-        require_finite("An event's", stones=stones)
-        return self.event(f"crosses at most {stones:g} stones", lambda t: t.metrics["stones"] <= stones)
+        return self.event(f"crosses at most {stones:g} stones", lambda t: t.metrics["stones"] <= stones, stones=stones)
 
     @property
     def path_coverage(self) -> Measure:
@@ -127,13 +124,17 @@ class PaperTrials(TrialGroup):
 
     def ends_within(self, distance: float) -> Event:
         """The final policy ends within `distance` (m) of where the target counts as reached, on average."""
-        require_finite("An event's", distance=distance)
-        return self.event(f"ends within {distance:g} m of the target", lambda t: t.metrics["distance"] <= distance)
+        return self.event(
+            f"ends within {distance:g} m of the target", lambda t: t.metrics["distance"] <= distance, distance=distance
+        )
 
     def passes_at_most(self, obstacles: float) -> Event:
         """The final policy passes at most `obstacles` obstacles, averaged over the examination's episodes."""
-        require_finite("An event's", obstacles=obstacles)
-        return self.event(f"passes at most {obstacles:g} obstacles", lambda t: t.metrics["obstacles"] <= obstacles)
+        return self.event(
+            f"passes at most {obstacles:g} obstacles",
+            lambda t: t.metrics["obstacles"] <= obstacles,
+            obstacles=obstacles,
+        )
 
     @property
     def obstacles_passed(self) -> Measure:
@@ -171,17 +172,16 @@ class PaperTrials(TrialGroup):
 
     def is_overturned(self, share: float) -> Event:
         """The robot is upside-down in more than `share` of the final policy's steps."""
-        require_finite("An event's", share=share)
         return self.event(
-            f"upside-down in more than {share:g} of the steps", lambda t: t.metrics["upside_down"] > share
+            f"upside-down in more than {share:g} of the steps", lambda t: t.metrics["upside_down"] > share, share=share
         )
 
     def pays(self, share: float) -> Event:
         """The final policy's control cost is more than `share` of its reward before costs."""
-        require_finite("An event's", share=share)
         return self.event(
             f"control cost above {share:g} of the reward",
             lambda t: t.metrics["control_cost"] > share * (t.metrics["last_fitness"] + t.metrics["control_cost"]),
+            share=share,
         )
 
     @property

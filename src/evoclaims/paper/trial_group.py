@@ -175,8 +175,14 @@ class TrialGroup:
             require_known(f"metric of {self.label}", name, self.condition.existing[0].metrics)
         return Measure(self, name, read or (lambda t: t.metrics[name]), better, unit=unit)
 
-    def event(self, name: str, holds: Callable[[TrialResult], bool]) -> Event:
-        """A custom event, such as `event("is fast", lambda t: t.metrics["steps"] < 100)`."""
+    def event(self, name: str, holds: Callable[[TrialResult], bool], **numbers: float) -> Event:
+        """A custom event, such as `event("is fast", lambda t: t.metrics["steps"] < 100)`.
+
+        Raises:
+            UserError: when one of `numbers`, those that `holds` compares with, is not finite: it would never hold, or
+                always.
+        """
+        require_finite(f"{self.label}: the event's", **numbers)
         return Event(self, name, holds)
 
     @property

@@ -90,6 +90,10 @@ def test_an_unknown_environment_or_setting_is_a_sentence() -> None:
         GymnasiumTask("CartPole-v9").make()
     with pytest.raises(UserError, match="Gymnasium cannot make 'CartPole-v1' with {'wheels': 4}"):
         GymnasiumTask("CartPole-v1", {"wheels": 4}).make()
+    with pytest.raises(UserError, match="Gymnasium cannot make 'FrozenLake-v1' with .*: KeyError 'bad'. Check"):
+        GymnasiumTask("FrozenLake-v1", {"map_name": "bad"}).make()
+    with pytest.raises(UserError, match=r"CartPole-v1 has providers='ale-py'\. Write a tuple, such as"):
+        GymnasiumTask("CartPole-v1", providers="ale-py")  # type: ignore[arg-type]
 
 
 def test_a_method_that_is_compiled_says_what_to_do_instead(store_of: Store) -> None:

@@ -188,16 +188,16 @@ def test_a_policy_scores_the_same_in_both_examinations(how: str) -> None:
             over = state >= 3  # after the fourth step, and, where nobody stops there, ever after
             changed = {
                 "truncated": {"truncated": over},
-                "reward": {"reward": jnp.where(over, jnp.inf, 1.0)},
+                "reward": {"reward": jnp.where(over, jnp.inf, 0.7)},
                 "observation": {"observation": jnp.where(over, jnp.nan, jnp.zeros(2))},
             }[how]
-            plain = {"observation": jnp.zeros(2), "reward": jnp.float32(1.0), "truncated": jnp.zeros((), bool)}
+            plain = {"observation": jnp.zeros(2), "reward": jnp.float32(0.7), "truncated": jnp.zeros((), bool)}
             return Moment(state=state + 1, terminated=jnp.zeros((), bool), **{**plain, **changed})
 
-    task = Ending("fast", episode_steps=12, examined_episodes=2, solved_at=3.0)
+    task = Ending("fast", episode_steps=12, examined_episodes=2, solved_at=3 * 0.7)  # a float32 is below this
     compiled = task.examine(lambda observation: jnp.zeros(1), jax.random.key(0), jnp.int32(0))
     fitness, success, metrics = task.examine_natively(lambda observation: np.zeros(1), 0)
-    assert fitness == (4.0 if how == "truncated" else 3.0) == compiled.fitness
+    assert fitness == pytest.approx(0.7 * (4 if how == "truncated" else 3)) == compiled.fitness
     assert success == 1.0 == compiled.success
     assert metrics == {"episode_steps": 4.0} == compiled.metrics
 
@@ -220,6 +220,13 @@ def test_wrong_names_and_what_map_elites_needs_are_sentences() -> None:
         BraxTask("fast", episode_steps=0)
     with pytest.raises(UserError, match="examined_episodes must be at least 1, not 0"):
         BraxTask("fast", examined_episodes=0)
+    with pytest.raises(UserError, match="CartPole-v1's max_steps_in_episode must be at least 1, not -1"):
+        GymnaxTask("CartPole-v1", {"max_steps_in_episode": -1})  # each episode would end at once
+    with pytest.raises(UserError, match="fast's solved_at must be a finite number, not '1'"):
+        BraxTask("fast", solved_at="1")  # type: ignore[arg-type]
+    for wrong in (("fast", 3), (3, {})):
+        with pytest.raises(UserError, match=r"BraxTask\(.*\) does not name an environment and its settings"):
+            BraxTask(*wrong)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("places", [(0,), (0, 1, 2), (-1, 0), (0.5, 1)])

@@ -187,6 +187,11 @@ class JaxTask(ForeignTask):
         """Act once, by an action of the environment's own."""
 
     @property
+    def threshold(self) -> float:
+        """The return that solves an episode, in the 32 bits that returns have: else none would be equal to 0.7."""
+        return float(np.float32(super().threshold))
+
+    @property
     def horizon(self) -> int:
         """Environment steps of the longest episode."""
         return self.episode_steps
@@ -295,15 +300,15 @@ class JaxTask(ForeignTask):
 
         def one(key: Array) -> tuple[float, int]:
             key, begin_key = jax.random.split(key)
-            moment, total = begin(begin_key), 0.0
+            moment, total = begin(begin_key), np.float32(0.0)
             for step in count(1):
                 key, step_key = jax.random.split(key)
                 action = jnp.asarray(native(policy(np.asarray(moment.observation))))
                 moment = advance(step_key, moment.state, action, np.int32(step))
-                total += float(moment.reward)
+                total += np.float32(moment.reward)
                 if moment.terminated or moment.truncated:
                     break
-            return total, step
+            return float(total), step
 
         with implicit_promotions():
             return self.scores(map(one, jax.random.split(trial_key(seed, EVALUATION), self.examined_episodes)))
