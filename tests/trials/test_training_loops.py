@@ -188,6 +188,8 @@ def test_a_policy_is_examined_as_all_are_be_it_of_numpy_or_of_jax(store: Store, 
     assert wrong.levels["success"] == (0.5, 0.5)
     assert wrong.metrics["last_success"] == 0.5  # whatever the function has claimed
     assert wrong.metrics["furthest_solved"] == -1.0
+    (table,) = run(condition(toy_loops.knows_by_text, NParity(3)), [0], store, cpus)
+    assert table.levels["success"] == (1.0, 1.0)  # no text of a traced observation is in it
 
 
 def _is_alive(pid: int) -> bool:
