@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 
 from evoclaims.core.canonical import require_numbers
 from evoclaims.core.errors import UserError
+from evoclaims.envs.ecorobot.stones import SteppingStones
 from evoclaims.envs.gates.alu import SimpleAlu
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.cma_es import CmaEs
@@ -305,10 +306,12 @@ def test_a_float_where_a_whole_number_is_declared_is_refused_with_the_name_of_th
     [
         (Ppo(entropy_cost=math.nan), TASK, r"Ppo has entropy_cost=nan\. Write a number in place of nan\."),
         (Neat(Settings(species=Species(disjoint=math.nan))), TASK, "Species has disjoint=nan"),
+        (METHOD, SteppingStones(shows_goal="no"), r"SteppingStones has shows_goal='no'\. Write True or False\."),  # type: ignore[arg-type]
+        (Ppo(normalize_observations=1), TASK, r"Ppo has normalize_observations=1\. Write True or False\."),  # type: ignore[arg-type]
     ],
-    ids=["method", "part of a part"],
+    ids=["method", "part of a part", "word for a truth", "number for a truth"],
 )
-def test_nan_is_refused_in_every_field(method: Any, task: Any, said: str) -> None:
+def test_nan_is_refused_in_every_field_and_a_word_for_a_truth(method: Any, task: Any, said: str) -> None:
     with pytest.raises(UserError, match=said):
         _ = Condition(method, task, "whole_budget", BUDGET).id
     mine = make_dataclass("Mine", [("ends", tuple[float, float])], frozen=True)

@@ -70,10 +70,11 @@ def _canonical_fields(kind: type) -> tuple[dataclasses.Field[Any], ...]:
 
 
 def require_numbers(value: Any) -> None:
-    """Refuse what is no number for a field of a dataclass, or of one among its fields.
+    """Refuse what is no number, or no truth, for a field of a dataclass, or of one among its fields.
 
-    That is a float where an int is declared, since 16.0 would have another id than 16; and NaN, for which no comparison
-    holds: checks such as `std <= 0` let it pass, and a goal within NaN is never reached.
+    That is a float where an int is declared, since 16.0 would have another id than 16; anything but True and False
+    where a bool is, since "no" is true to Python; and NaN, for which no comparison holds: checks such as `std <= 0` let
+    it pass, and a goal within NaN is never reached.
 
     Raises:
         UserError: naming the field.
@@ -88,6 +89,8 @@ def require_numbers(value: Any) -> None:
                 f"{type(value).__name__} has {name}={given!r}. Write whole numbers without a decimal point "
                 f"({declared})."
             )
+        if declared == "bool" and not isinstance(given, bool):
+            raise UserError(f"{type(value).__name__} has {name}={given!r}. Write True or False.")
         if any(isinstance(item, float) and math.isnan(item) for item in items):
             raise UserError(f"{type(value).__name__} has {name}={given!r}. Write a number in place of nan.")
         for item in items:

@@ -64,7 +64,7 @@ class Mutation:
         """Check the probabilities."""
         for field in fields(self):
             value = getattr(self, field.name)
-            if not isinstance(value, Attribute) and not 0 <= value <= 1:
+            if isinstance(value, int | float) and not 0 <= value <= 1:
                 raise UserError(f"A probability of NEAT is {field.name}={value}. Write a number from 0 to 1.")
 
 
