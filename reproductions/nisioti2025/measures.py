@@ -76,11 +76,11 @@ class PaperTrials(TrialGroup):
 
     def crosses(self, stones: float) -> Event:
         """The final policy crosses exactly `stones` stones in every episode."""
-        return self.event(f"crosses {stones:g} stones", lambda t: t.metrics["stones"] == stones)
+        return self.event(f"crosses {stones:g} stones", lambda t: t.metrics["stones"] == stones, stones=stones)
 
     def crosses_at_most(self, stones: float) -> Event:
         """The final policy crosses at most `stones` stones, averaged over the examination's episodes."""
-        return self.event(f"crosses at most {stones:g} stones", lambda t: t.metrics["stones"] <= stones)
+        return self.event(f"crosses at most {stones:g} stones", lambda t: t.metrics["stones"] <= stones, stones=stones)
 
     @property
     def path_coverage(self) -> Measure:
@@ -124,11 +124,17 @@ class PaperTrials(TrialGroup):
 
     def ends_within(self, distance: float) -> Event:
         """The final policy ends within `distance` (m) of where the target counts as reached, on average."""
-        return self.event(f"ends within {distance:g} m of the target", lambda t: t.metrics["distance"] <= distance)
+        return self.event(
+            f"ends within {distance:g} m of the target", lambda t: t.metrics["distance"] <= distance, distance=distance
+        )
 
     def passes_at_most(self, obstacles: float) -> Event:
         """The final policy passes at most `obstacles` obstacles, averaged over the examination's episodes."""
-        return self.event(f"passes at most {obstacles:g} obstacles", lambda t: t.metrics["obstacles"] <= obstacles)
+        return self.event(
+            f"passes at most {obstacles:g} obstacles",
+            lambda t: t.metrics["obstacles"] <= obstacles,
+            obstacles=obstacles,
+        )
 
     @property
     def obstacles_passed(self) -> Measure:
@@ -167,7 +173,7 @@ class PaperTrials(TrialGroup):
     def is_overturned(self, share: float) -> Event:
         """The robot is upside-down in more than `share` of the final policy's steps."""
         return self.event(
-            f"upside-down in more than {share:g} of the steps", lambda t: t.metrics["upside_down"] > share
+            f"upside-down in more than {share:g} of the steps", lambda t: t.metrics["upside_down"] > share, share=share
         )
 
     def pays(self, share: float) -> Event:
@@ -175,6 +181,7 @@ class PaperTrials(TrialGroup):
         return self.event(
             f"control cost above {share:g} of the reward",
             lambda t: t.metrics["control_cost"] > share * (t.metrics["last_fitness"] + t.metrics["control_cost"]),
+            share=share,
         )
 
     @property

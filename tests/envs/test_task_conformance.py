@@ -33,7 +33,7 @@ _SHORT: Any = {"episode_steps": 4, "examined_episodes": 2}
 ROBOTS: dict[str, Any] = {
     "stepping stones": SteppingStones(shows_goal=True, **_SHORT),
     "deceptive maze": DeceptiveMaze(**_SHORT),
-    "obstacles": Obstacles(robot=SIMPLE_ROB, **_SHORT),
+    "obstacles": Obstacles(**_SHORT),
     "locomotion": Locomotion(robot=SIMPLE_ROB, **_SHORT),
 }
 """Tasks whose episodes start at random, and whose physics rounds as the compiler arranges it."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import jax
@@ -64,7 +65,7 @@ def test_the_standard_deviation_scales_what_is_drawn() -> None:
     assert float(np.abs(drawn[1.0].parameters).max()) > 0
 
 
-@pytest.mark.parametrize("wrong", [{"population": 0}, {"std": 0.0}, {"std": -1.0}])
+@pytest.mark.parametrize("wrong", [{"population": 0}, *({"std": wrong} for wrong in (0.0, -1.0, math.inf, math.nan))])
 def test_impossible_sizes_are_one_sentence(wrong: dict[str, Any]) -> None:
-    with pytest.raises(UserError, match="population of at least 1 and a std above 0"):
+    with pytest.raises(UserError, match="population of at least 1 and a finite std above 0"):
         RandomSearch(**wrong)

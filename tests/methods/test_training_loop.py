@@ -51,6 +51,10 @@ def test_what_another_process_cannot_call_is_a_sentence() -> None:
             TrainingLoop(function, packages=())
     with pytest.raises(UserError, match=r"train does not take \(task, seed, budget\) and the settings speed: got"):
         TrainingLoop(train, {"speed": 1.0}, packages=())
+    with pytest.raises(UserError, match="settings=0.2 of a training loop is not a table of arguments by name"):
+        TrainingLoop(train, 0.2, packages=())  # type: ignore[arg-type]
+    with pytest.raises(UserError, match="TrainingLoop has deterministic='no'. Write True or False"):
+        _id(TrainingLoop(train, packages=(), deterministic="no"))  # type: ignore[arg-type]
     for value in ({1}, {1: 2.0}, NParity, [Mlp((4,))]):  # of dataclasses an id would have the fields, but not the class
         with pytest.raises(
             UserError, match=r"The setting 'rate' of a training loop is .* Write numbers, words, and lists or tables"

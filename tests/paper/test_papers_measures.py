@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from evoclaims.core.errors import UserError
 from evoclaims.judging.measure import Event, Measure
 from evoclaims.judging.window import Window
 from evoclaims.paper import references
@@ -77,6 +78,16 @@ def test_a_trial_that_diverged_counts_as_the_worst_robot(
 )
 def test_an_event_holds_where_its_name_says(read: Any, what: Any, name: str, given: Any, held: Any) -> None:
     assert read(what, name, given) == held
+
+
+@pytest.mark.parametrize(
+    "name", ["crosses", "crosses_at_most", "passes_at_most", "ends_within", "is_overturned", "pays"]
+)
+@pytest.mark.parametrize("number", [math.nan, math.inf])
+def test_an_event_at_a_number_that_is_not_finite_is_refused(name: str, number: float) -> None:
+    group = PaperTrials("neat", "n_parity", CONDITION, lambda *_: [])
+    with pytest.raises(UserError, match=f"must be a finite number, not {number}"):
+        getattr(group, name)(number)
 
 
 def test_steps_to_a_success_of_1_are_those_after_which_the_papers_direct_trials_end() -> None:

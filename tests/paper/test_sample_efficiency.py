@@ -136,7 +136,7 @@ def test_a_misspelt_curve_says_which_there_are(group: Any) -> None:
     trials = group([0.0] * 4)
     with pytest.raises(UnreadableTrialError, match="Did you mean 'success'"):
         trials.steps_to("sucess", 0.9).of(trials.fetch([0])[0])
-    with pytest.raises(UserError, match="a value that is not finite"):
+    with pytest.raises(UserError, match="the value must be a finite number, not nan"):
         trials.steps_to("success", math.nan)
     with pytest.raises(UserError, match="between 0 and 1, and never reaches 90"):
         trials.steps_to("success", 90)

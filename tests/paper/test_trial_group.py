@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -96,9 +97,12 @@ def test_each_event_holds_where_its_name_says(group: Any, event: Any, held: tupl
         (lambda g: g.solves_level(2), "2 levels, counted from 0: .* level 2 .* from 0 to 1"),
         (lambda g: g.solves_no_level_beyond(1), "2 levels, counted from 0: .* level 1 .* from -1 to 0"),
         (lambda g: g.solves_no_level_beyond(-2), "level -2"),
+        (lambda g: g.last_success_is(math.nan), "a success's value must be a finite number, not nan"),
+        (lambda g: g.success_everywhere_is(math.nan), "a success's value must be a finite number, not nan"),
+        (lambda g: g.success_everywhere_is(100), "a success is between 0 and 1, and never reaches 100"),
     ],
 )
-def test_what_would_always_hold_of_a_level_or_never_is_refused(group: Any, event: Any, said: str) -> None:
+def test_what_would_always_hold_or_never_is_refused(group: Any, event: Any, said: str) -> None:
     with pytest.raises(UserError, match=said):
         event(group(lambda seed: 1.0))
 

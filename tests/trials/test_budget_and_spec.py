@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import subprocess
@@ -13,12 +14,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoclaims.core.canonical import require_whole_numbers
+from evoclaims.core.canonical import require_numbers
 from evoclaims.core.errors import UserError
+from evoclaims.envs.ecorobot.stones import SteppingStones
 from evoclaims.envs.gates.alu import SimpleAlu
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.cma_es import CmaEs
 from evoclaims.methods.hand_built import HandBuilt
+from evoclaims.methods.neat.evolution import Neat
+from evoclaims.methods.neat.settings import Settings, Species
+from evoclaims.methods.ppo import Ppo
 from evoclaims.methods.random_search import RandomSearch
 from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.networks.all_skips import AllSkips
@@ -296,8 +301,27 @@ def test_a_float_where_a_whole_number_is_declared_is_refused_with_the_name_of_th
         _ = Condition(method, NParity(3), "curriculum", Budget(generations=1)).id
 
 
+@pytest.mark.parametrize(
+    ("method", "task", "said"),
+    [
+        (Ppo(entropy_cost=math.nan), TASK, r"Ppo has entropy_cost=nan\. Write a number in place of nan\."),
+        (Neat(Settings(species=Species(disjoint=math.nan))), TASK, "Species has disjoint=nan"),
+        (METHOD, SteppingStones(shows_goal="no"), r"SteppingStones has shows_goal='no'\. Write True or False\."),  # type: ignore[arg-type]
+        (Ppo(normalize_observations=1), TASK, r"Ppo has normalize_observations=1\. Write True or False\."),  # type: ignore[arg-type]
+    ],
+    ids=["method", "part of a part", "word for a truth", "number for a truth"],
+)
+def test_nan_is_refused_in_every_field_and_a_word_for_a_truth(method: Any, task: Any, said: str) -> None:
+    with pytest.raises(UserError, match=said):
+        _ = Condition(method, task, "whole_budget", BUDGET).id
+    mine = make_dataclass("Mine", [("ends", tuple[float, float])], frozen=True)
+    require_numbers(mine((-math.inf, math.inf)))
+    with pytest.raises(UserError, match=r"Mine has ends=\(0.0, nan\)"):
+        require_numbers(mine((0.0, math.nan)))
+
+
 def test_a_float_in_a_class_whose_annotations_are_types_is_refused_too() -> None:
     mine = make_dataclass("Mine", [("sizes", tuple[int, int]), ("rate", float)], frozen=True)
-    require_whole_numbers(mine((1, 2), 3))
+    require_numbers(mine((1, 2), 3))
     with pytest.raises(UserError, match=r"Mine has sizes=.* Write whole numbers"):
-        require_whole_numbers(mine((1, 2.5), 0.5))
+        require_numbers(mine((1, 2.5), 0.5))

@@ -67,6 +67,7 @@ def test_json_of_pandas_is_read_in_every_layout_with_names(
         (FRAME.set_index("note").to_json(), "which may be its columns or its rows: write it by to_json"),
         (FRAME.T.to_json(orient="split").replace("7,", ""), "not all of its rows have 3 cells, as many as its columns"),
         ('{"seed": [1, 2], "return": [3]}', r"its columns have different lengths \(1, 2\)"),
+        ('{"seed": {"0": 1, "0": 2}, "return": {"0": 3, "0": 4}}', "two of its rows have one label"),
         ('{"seed": 1, "return": 2}\n# the end', "its line 2 is '# the end'"),
         ('"runs"', "and this is 'runs'"),
     ],
@@ -74,6 +75,12 @@ def test_json_of_pandas_is_read_in_every_layout_with_names(
 def test_json_without_names_or_with_doubt_is_refused(values: Callable[..., list[float]], text: str, said: str) -> None:
     with pytest.raises(UserError, match=rf"runs\.json is not a table that can be read: .*({said})"):
         values(text, "runs.json")
+
+
+def test_json_of_a_frame_without_columns_is_a_table_without_columns(values: Callable[..., list[float]]) -> None:
+    for layout in ("split", "columns", "index"):
+        with pytest.raises(UserError, match="runs.json is a table without columns"):
+            values(pd.DataFrame().to_json(orient=layout), "runs.json")
 
 
 MONITOR = '#{"t_start": 1690000000.5, "env_id": "CartPole-v1"}\n'

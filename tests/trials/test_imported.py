@@ -225,6 +225,12 @@ def test_where_the_folder_is_does_not_matter(table: Callable[..., Imported], tmp
         ({"path": "gone.csv"}, r"The table .*gone\.csv cannot be read: No such file"),
         ({"path": "runs.xlsx"}, r"runs\.xlsx is not a table that can be read. Its name must end in \.csv, "),
         ({"metric": ""}, r"Imported\('runs\.csv'\) names no metric"),
+        ({"metric": 3}, r"Imported\('runs\.csv'\) has metric=3\. Write the name of a column, or several\."),
+        ({"metric": ["return", 3]}, r"has metric=\['return', 3\]\. Write a column's name, or several, or columns by"),
+        ({"metric": {3: "return"}}, r"has metric={3: 'return'}\. Write a column's name, or several, or columns by"),
+        ({"where": ["algo"]}, r"has where=\['algo'\]\. Write values by column, such as"),
+        ({"path": 3}, r"Imported\('3'\) has path=3\. Write the path of a table\."),
+        ({"empty_means_diverged": "no"}, r"has empty_means_diverged='no'\. Write True or False\."),
         (
             {"metric": ["return", "environment_steps"], "step": "lr"},
             r"Imported\('runs\.csv'\) has two columns of environment steps: 'environment_steps' and step='lr'",

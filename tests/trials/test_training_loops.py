@@ -47,21 +47,20 @@ IN_EVERY_WAY = condition(toy_loops.in_every_way)
 def all_ends(tmp_path_factory: pytest.TempPathFactory, cpus: list[Any]) -> tuple[Store, list[TrialResult], list[Any]]:
     """Trials of a loop that ends in every way, and what was told meanwhile."""
     store, told = Store(tmp_path_factory.mktemp("ends") / "store"), list[RunProgress]()
-    return store, run(IN_EVERY_WAY, range(5), store, cpus, told.append), told
+    return store, run(IN_EVERY_WAY, range(6), store, cpus, told.append), told
 
 
 def test_each_trial_ends_as_its_process_does_and_the_others_go_on(all_ends: Any) -> None:
     _, results, told = all_ends
-    assert [result.status for result in results] == ["done", "crashed", "crashed", "diverged", "diverged"]
+    assert [result.status for result in results] == ["done", "crashed", "crashed", "diverged", "diverged", "diverged"]
     good = results[0]
     assert good.metrics["last_fitness"] == 7.5
-    assert good.metrics["found"] == math.inf
     assert good.metrics["jax"] == 0.0  # a second of each trial, for loops that do not need it
     assert good.metrics["environment_steps"] == 100
     assert math.isnan(good.metrics["mean_success"])
     assert good.provenance["scored_by"] == "training function"
     assert good.provenance["trained_by"] == "toy_loops:in_every_way"
-    assert told[-1].ended == told[-1].trials == 5
+    assert told[-1].ended == told[-1].trials == 6
     assert told[-1].total_steps == 100
 
 
@@ -84,7 +83,7 @@ def test_what_is_reported_becomes_curves_of_as_many_points_as_the_budget_says(al
     assert all(map(math.isfinite, all_ends[1][4].curves["fitness"]))  # it has diverged by what no point shows
 
 
-def test_a_crash_tells_the_last_words_of_its_process_safely(all_ends: Any) -> None:
+def test_a_crash_tells_the_last_words_of_its_process_safely_and_a_divergence_its_number(all_ends: Any) -> None:
     _, (_, raised, killed, *_), told = all_ends
     assert failed.why(raised) == "ValueError: the reactor is \\x1b[31mred"
     assert "in in_every_way" in raised.provenance["crash"]
@@ -95,7 +94,10 @@ def test_a_crash_tells_the_last_words_of_its_process_safely(all_ends: Any) -> No
     assert failed.why(killed) == "its process ended with SIGSEGV"
     assert "what it prints is no answer" in killed.provenance["crash"]
     assert {one.phase for one in told if one.remark} == {
-        f"seed {one.seed} crashed: {failed.why(one)}" for one in (raised, killed)
+        *(f"seed {one.seed} crashed: {failed.why(one)}" for one in (raised, killed)),
+        "seed 3 diverged: its function returned last_fitness = nan",
+        "seed 4 diverged: its function reported a number that is not finite",
+        "seed 5 diverged: its function returned last_fitness = inf",
     }
 
 
@@ -124,7 +126,7 @@ def test_what_a_loop_does_in_an_odd_way_is_understood_or_is_a_crash_that_says_wh
 ) -> None:
     odd = condition(toy_loops.in_odd_ways, clip=math.inf)
     good, *crashed = run(odd, range(5), store, cpus, time_limit=30.0)
-    assert (good.metrics["last_fitness"], good.metrics["clip"]) == (0.25, math.inf)
+    assert (good.metrics["last_fitness"], good.metrics["unbounded"]) == (0.25, 1.0)
     assert good.metrics["environment_steps"] == 55
     assert [one.status for one in crashed] == ["crashed"] * 4
     too_far, long, unnamed, reading = map(failed.why, crashed)
@@ -186,6 +188,8 @@ def test_a_policy_is_examined_as_all_are_be_it_of_numpy_or_of_jax(store: Store, 
     assert wrong.levels["success"] == (0.5, 0.5)
     assert wrong.metrics["last_success"] == 0.5  # whatever the function has claimed
     assert wrong.metrics["furthest_solved"] == -1.0
+    (table,) = run(condition(toy_loops.knows_by_text, NParity(3)), [0], store, cpus)
+    assert table.levels["success"] == (1.0, 1.0)  # no text of a traced observation is in it
 
 
 def _is_alive(pid: int) -> bool:

@@ -69,8 +69,12 @@ def _canonical_fields(kind: type) -> tuple[dataclasses.Field[Any], ...]:
     return tuple(field for field in dataclasses.fields(kind) if field.metadata.get("canonical", True))
 
 
-def require_whole_numbers(value: Any) -> None:
-    """Refuse a float where a dataclass, or one among its fields, declares an int: 16.0 would have another id than 16.
+def require_numbers(value: Any) -> None:
+    """Refuse what is no number, or no truth, for a field of a dataclass, or of one among its fields.
+
+    That is a float where an int is declared, since 16.0 would have another id than 16; anything but True and False
+    where a bool is, since "no" is true to Python; and NaN, for which no comparison holds: checks such as `std <= 0` let
+    it pass, and a goal within NaN is never reached.
 
     Raises:
         UserError: naming the field.
@@ -85,9 +89,13 @@ def require_whole_numbers(value: Any) -> None:
                 f"{type(value).__name__} has {name}={given!r}. Write whole numbers without a decimal point "
                 f"({declared})."
             )
+        if declared == "bool" and not isinstance(given, bool):
+            raise UserError(f"{type(value).__name__} has {name}={given!r}. Write True or False.")
+        if any(isinstance(item, float) and math.isnan(item) for item in items):
+            raise UserError(f"{type(value).__name__} has {name}={given!r}. Write a number in place of nan.")
         for item in items:
             if type(item) not in _UNCHANGED:
-                require_whole_numbers(item)
+                require_numbers(item)
 
 
 @functools.cache

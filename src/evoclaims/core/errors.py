@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import difflib
+import math
 import traceback
 from collections.abc import Collection, Iterable
+from numbers import Integral, Real
 from pathlib import Path
 from typing import Final
 
@@ -37,11 +39,23 @@ def require_known(kind: str, name: object, known: Collection[object]) -> None:
         raise UnknownNameError(kind, name, map(str, known))
 
 
-def require_at_least(least: float, whose: str, **values: float) -> None:
-    """Raise a `UserError`, such as "PPO's minibatches must be at least 1, not 0.", for a value below `least`."""
-    for name, value in values.items():
-        if value < least:
-            raise UserError(f"{whose} {name} must be at least {least}, not {value}.")
+def require_at_least(least: int, whose: str, **counts: object) -> None:
+    """Raise a `UserError`, such as "PPO's minibatches must be at least 1, not 0.", but for whole numbers from there."""
+    for name, count in counts.items():
+        if not isinstance(count, Integral):
+            raise UserError(f"{whose} {name} must be a whole number, not {count!r}.")
+        if count < least:
+            raise UserError(f"{whose} {name} must be at least {least}, not {count}.")
+
+
+def require_finite(whose: str, **numbers: object) -> None:
+    """Raise a `UserError`, such as "PPO's discounting must be a finite number, not nan.", for anything else.
+
+    No comparison holds for NaN, so a bound alone, such as `if std <= 0`, lets it pass.
+    """
+    for name, number in numbers.items():
+        if not isinstance(number, Real) or not math.isfinite(number):
+            raise UserError(f"{whose} {name} must be a finite number, not {number!r}.")
 
 
 def guess(name: object, known: Iterable[str]) -> str:

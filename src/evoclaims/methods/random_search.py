@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -38,10 +39,10 @@ class RandomSearch:
 
     def __post_init__(self) -> None:
         """Check the size and the spread."""
-        if self.population < 1 or self.std <= 0:
+        if not (self.population >= 1 and 0 < self.std < math.inf):
             raise UserError(
                 f"Random search has population={self.population} and std={self.std}. Write a population of at least "
-                "1 and a std above 0."
+                "1 and a finite std above 0."
             )
 
     def init(self, key: PRNGKeyArray, task: Task) -> Champion:

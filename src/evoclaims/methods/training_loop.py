@@ -50,6 +50,8 @@ class TrainingLoop:
 
     def __post_init__(self) -> None:
         """Replace the function by its place, after checking that it takes the settings."""
+        if not isinstance(self.settings, Mapping):
+            raise UserError(f"settings={self.settings!r} of a training loop is not a table of arguments by name.")
         object.__setattr__(self, "settings", dict(self.settings))
         if isinstance(self.overspend, bool) or not (isinstance(self.overspend, int | float) and self.overspend >= 0):
             raise UserError(

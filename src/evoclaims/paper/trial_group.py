@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from evoclaims.core.errors import UnknownNameError, UserError, require_known
+from evoclaims.core.errors import UnknownNameError, UserError, require_finite, require_known
 from evoclaims.judging.measure import Event, Measure, Profile
 from evoclaims.judging.reading import Better
 from evoclaims.judging.sample import Source, UnreadableTrialError
@@ -37,12 +37,9 @@ def steps_to(source: Source, condition: Condition, curve: str, value: float, lev
     """
     levels = condition.task.levels
     wanted = levels - 1 if level is None else level
-    if not math.isfinite(value):
-        raise UserError(f"{source.label}: steps_to({value}) asks for a value that is not finite. Write a number.")
-    if curve == "success" and not 0.0 <= value <= 1.0:
-        raise UserError(
-            f"{source.label}: a success is between 0 and 1, and never reaches {value:g}. Use a value in this range."
-        )
+    require_finite(f"{source.label}: the", value=value)
+    if curve == "success":
+        _require_success(source.label, value)
     if not 0 <= wanted < levels:
         raise UserError(f"{source.label} has no level {wanted}. Use one from 0 to {levels - 1}.")
     budget = float(condition.environment_steps)
@@ -69,6 +66,15 @@ def steps_to(source: Source, condition: Condition, curve: str, value: float, lev
     # Reports of imported trials are perhaps unevenly far apart, at steps that are no multiples of the longest distance.
     window = Window(budget, float(condition.report_distance), as_reported=imported)
     return Measure(source, name, read, "lower", window)
+
+
+def _require_success(label: str, value: float) -> None:
+    """Reject a success that none can be: an event at it would never hold."""
+    require_finite(f"{label}: a success's", value=value)
+    if not 0.0 <= value <= 1.0:
+        raise UserError(
+            f"{label}: a success is between 0 and 1, and never reaches {value:g}. Use a value in this range."
+        )
 
 
 def _trained_levels(trial: TrialResult, levels: int) -> list[float]:
@@ -169,8 +175,14 @@ class TrialGroup:
             require_known(f"metric of {self.label}", name, self.condition.existing[0].metrics)
         return Measure(self, name, read or (lambda t: t.metrics[name]), better, unit=unit)
 
-    def event(self, name: str, holds: Callable[[TrialResult], bool]) -> Event:
-        """A custom event, such as `event("is fast", lambda t: t.metrics["steps"] < 100)`."""
+    def event(self, name: str, holds: Callable[[TrialResult], bool], **numbers: float) -> Event:
+        """A custom event, such as `event("is fast", lambda t: t.metrics["steps"] < 100)`.
+
+        Raises:
+            UserError: when one of `numbers`, those that `holds` compares with, is not finite: it would never hold, or
+                always.
+        """
+        require_finite(f"{self.label}: the event's", **numbers)
         return Event(self, name, holds)
 
     @property
@@ -252,10 +264,12 @@ class TrialGroup:
 
     def last_success_is(self, value: float) -> Event:
         """The final policy's success on the last level is exactly `value`."""
+        _require_success(self.label, value)
         return self.event(f"success on the last level is {_exact(value)}", lambda t: t.metrics["last_success"] == value)
 
     def success_everywhere_is(self, value: float) -> Event:
         """The final policy's success is exactly `value` on every level."""
+        _require_success(self.label, value)
         name = "solves every level" if value == 1.0 else f"success is {_exact(value)} on every level"
         return self.event(name, lambda t: all(x == value for x in t.levels["success"]))
 

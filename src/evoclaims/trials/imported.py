@@ -124,6 +124,18 @@ class _Unknown:
     packages: tuple[str, ...] = ()
 
 
+_WANTED: Final[Mapping[str, tuple[Any, str]]] = {
+    "path": (str | Path, "the path of a table"),
+    "seed": (str, "the name of a column"),
+    "metric": (str | Sequence | Mapping, "the name of a column, or several"),
+    "where": (Mapping, 'values by column, such as {"algo": "sac"}'),
+    "step": (str, "the name of a column, or leave it out"),
+    "by": (str, "text"),
+    "empty_means_diverged": (bool, "True or False"),
+}
+"""What a field has to be: in words like "no", which is true to Python, nobody would see what counts."""
+
+
 @dataclass(frozen=True)
 class Imported(Condition):
     """Trials that another program has run, read from a table; they are judged as the harness's own are.
@@ -159,7 +171,16 @@ class Imported(Condition):
     budget: Any = field(init=False, repr=False, default=None)
 
     def __post_init__(self) -> None:
-        """Reject a table from which no number is read, and two axes of a curve."""
+        """Reject what no table is read by, a table from which no number is read, and two axes of a curve."""
+        for name, (kind, wanted) in _WANTED.items():
+            given = getattr(self, name)
+            if not isinstance(given, kind):
+                raise UserError(f"Imported({str(self.path)!r}) has {name}={given!r}. Write {wanted}.")
+        if not all(isinstance(name, str) for columns in self.columns.items() for name in columns):
+            raise UserError(
+                f"Imported({str(self.path)!r}) has metric={self.metric!r}. Write a column's name, or several, or "
+                "columns by metrics' names."
+            )
         if not self.columns:
             raise UserError(
                 f"Imported({str(self.path)!r}) names no metric. Write metric=..., the column of what was measured."

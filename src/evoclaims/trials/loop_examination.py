@@ -49,7 +49,11 @@ def fixed_observations(task: Task, count: int) -> NDArray[np.float32]:
 
 
 def _fitted(task: Task, policy: Callable[[Any], Any]) -> Callable[[Array], Array]:
-    """Return a policy that jax can trace: the given one, or else one that calls it on the host."""
+    """Return a policy that jax can trace: the given one, or else one that calls it on the host.
+
+    A table whose keys are texts, as `table.get(str(observation), 0)`, is traced without an error, and never finds what
+    it looks for. So one whose traced action does not depend on the observation is called on the host, too.
+    """
 
     def traced(observation: Array) -> Array:
         return jnp.asarray(policy(observation), jnp.float32)
@@ -63,7 +67,16 @@ def _fitted(task: Task, policy: Callable[[Any], Any]) -> Callable[[Array], Array
 
     action = jax.ShapeDtypeStruct((task.action_size,), jnp.float32)
     try:
-        jax.eval_shape(traced, jax.ShapeDtypeStruct((task.observation_size,), jnp.float32))
+        program = jax.make_jaxpr(traced)(jax.ShapeDtypeStruct((task.observation_size,), jnp.float32))
     except Exception:  # PyTorch and NumPy each have their own way to refuse what jax traces
         return called
-    return traced
+    return traced if _depends(program.jaxpr) else called
+
+
+def _depends(program: Any) -> bool:
+    """Whether what a program returns depends on what it is given."""
+    needed = {id(one) for one in program.outvars}
+    for step in reversed(program.eqns):
+        if any(id(one) in needed for one in step.outvars):
+            needed.update(map(id, step.invars))
+    return any(id(one) in needed for one in program.invars)

@@ -136,17 +136,14 @@ def trained_record(
 
     The metrics are those of the function, those of every method (see `result_making.make_result`) and the task's own.
     The examination's numbers count, not the function's. Without one, those that the function does not return
-    are NaN: a claim that reads such a number is an error. A trial has diverged when its function returned a NaN, or
-    reported a number that is not finite, or its policy's scores are not.
+    are NaN: a claim that reads such a number is an error. See `why_diverged` for the status.
     """
     returned, scores = trained.metrics, trained.scores
-    broken = not trained.finite or any(map(math.isnan, returned.values()))
     if scores is None:  # the last level at most is known
         unknown = (math.nan,) * (spec.condition.task.levels - 1)
         levels = {name: (*unknown, returned.get(f"last_{name}", math.nan)) for name in ("success", "fitness")}
     else:
         levels = {"success": scores.success, "fitness": scores.fitness}
-        broken = broken or not all(map(math.isfinite, (*scores.success, *scores.fitness)))
     steps = returned.get("environment_steps", spec.condition.steps if trained.step is None else trained.step)
     success = levels["success"]
     solved = [level for level, value in enumerate(success) if value == 1.0]
@@ -164,7 +161,7 @@ def trained_record(
     else:
         known = {name: value for name, value in metrics.items() if not math.isnan(value)}
         metrics |= returned | known | scores.metrics
-    status: Status = "diverged" if broken else "done"
+    status: Status = "diverged" if why_diverged(trained) else "done"
     origin = {
         TRAINED_BY: loop.place,
         SCORED_BY: "training function" if scores is None else "examination",
@@ -175,6 +172,17 @@ def trained_record(
         },
     }
     return make_record(spec, status, metrics, levels, curves, b"", timing, devices, origin)
+
+
+def why_diverged(trained: Trained) -> str:
+    """Return what was not finite, as a clause; empty for a trial that has not diverged."""
+    if not trained.finite:
+        return "its function reported a number that is not finite"
+    broken = [f"{name} = {value}" for name, value in trained.metrics.items() if not math.isfinite(value)]
+    if broken:
+        return f"its function returned {', '.join(broken)}"
+    scores = () if trained.scores is None else (*trained.scores.success, *trained.scores.fitness)
+    return "" if all(map(math.isfinite, scores)) else "the scores of its policy are not finite"
 
 
 _ONE_THREAD: Final = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
@@ -322,6 +330,8 @@ class LoopTrials:
         ending = ""
         if isinstance(one.outcome, Trained):
             result = trained_record(one.spec, self._loop, one.outcome, one.curves, timing, self._devices)
+            reason = why_diverged(one.outcome)
+            ending = f"diverged: {reason}" if reason else ""
         elif isinstance(one.outcome, Failed):
             result = make_unfinished(one.spec, "crashed", one.curves, timing, self._devices, one.outcome.reason)
             failed.remember(result)

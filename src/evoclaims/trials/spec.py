@@ -9,7 +9,7 @@ from inspect import getattr_static
 from numbers import Real
 from typing import Any, Final, Literal, get_args
 
-from evoclaims.core.canonical import as_plain, content_hash, fields_of, is_own, require_whole_numbers
+from evoclaims.core.canonical import as_plain, content_hash, fields_of, is_own, require_numbers
 from evoclaims.core.errors import UserError, require_known
 from evoclaims.core.packages import ALWAYS, installed, packages_of
 from evoclaims.core.source_code import CODE, code_of
@@ -69,7 +69,7 @@ def _described(component: Any, kind_of: Literal["method", "task", ""]) -> dict[s
             f"{kind} has no {' and no '.join(unsaid)}. Write `{unsaid[0]}: ClassVar[int] = …` in it, or a "
             f"field or property of that name. A {kind_of} needs {', '.join(numbers)}."
         )
-    require_whole_numbers(component)
+    require_numbers(component)
     inherited = not is_own(type(component)) and not _has_own_name(component)
     named = {"class": kind} if inherited else {}  # it computes something else than the class whose name it has
     try:

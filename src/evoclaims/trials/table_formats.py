@@ -194,6 +194,8 @@ def _of_object(whole: _Pairs) -> Columns:
         outer, inner = (_are_counted(names) for names in (table, {name for value in values for name, _ in value}))
         if inner and not outer:
             columns = {name: dict(cells) for name, cells in whole}
+            if any(len(dict(cells)) < len(cells) for cells in values):
+                raise NoTableError("two of its rows have one label, and only one of them would be read")
             labels = dict.fromkeys(label for cells in columns.values() for label in cells)
             return _of_lists(_Pairs((name, [dict(cells).get(label) for label in labels]) for name, cells in whole))
         if outer and not inner:
@@ -210,7 +212,7 @@ def _of_lists(columns: _Pairs) -> Columns:
     lengths = {len(cells) for _, cells in columns}
     if len(lengths) > 1:
         raise NoTableError(f"its columns have different lengths ({', '.join(map(str, sorted(lengths)))})")
-    return Columns([name for name, _ in columns], lengths.pop(), lambda place: columns[place][1])
+    return Columns([name for name, _ in columns], max(lengths, default=0), lambda place: columns[place][1])
 
 
 def _are_counted(names: Iterable[str]) -> bool:

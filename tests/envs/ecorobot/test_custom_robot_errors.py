@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -171,7 +172,7 @@ def test_boxes_collide_with_whatever_collides(bits: tuple[int, int], texts: Text
 
 
 def test_a_geom_that_touches_nothing_may_have_any_type(texts: Texts) -> None:
-    text = SLED.replace('type="sphere" size="0.2"', 'type="cylinder" size="0.2 0.1" contype="0" conaffinity="0"')
+    text = PLANAR.replace('type="sphere" size="0.2"', 'type="cylinder" size="0.2 0.1" contype="0" conaffinity="0"')
     assert Obstacles(robot=texts.robot(text)).action_size == 1
 
 
@@ -215,6 +216,45 @@ def test_built_in_robots_that_move_in_a_plane_are_refused_in_a_maze(robot: Robot
     else:
         with pytest.raises(UserError, match="starts its robots at x -3 and y 1, but with these as the first two"):
             SteppingStones(robot=robot)
+
+
+@pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS)
+def test_robots_that_could_walk_around_obstacles_are_refused_there(robot: Robot) -> None:
+    if robot in IN_A_MAZE:
+        with pytest.raises(
+            UserError, match=f"no walls at the ends of its obstacles, and the robot {robot.name} could walk"
+        ):
+            Obstacles(robot=robot)
+    else:
+        moved = replace(robot, start=(8.0, *[0.0] * (Scene(robot).model.nq - 1)))  # no longer as it is built in
+        assert [Obstacles(robot=one).robot for one in (robot, moved)] == [robot, moved]
+        with pytest.raises(UserError, match=f"{robot.name} starts at x 9 and y 0, but the first obstacle .* at x 8.8"):
+            Obstacles(robot=replace(moved, start=(9.0, *moved.start[1:])))
+
+
+PLANAR = SLED.replace('<joint name="y" type="slide" axis="0 1 0"/>', '<joint name="y" type="hinge" axis="0 -2 0"/>')
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (("", ""), ""),
+        (('axis="1 0 0"', 'axis="1 0.1 0"'), "could walk around them"),
+        (('axis="0 -2 0"', 'axis="0 0 1"'), "could walk around them"),
+        (('type="hinge"', 'type="ball"'), "could walk around them"),
+        (('pos="0 0 0.3"', 'pos="0 3.5 0.3"'), "starts at x 0 and y 3.5"),
+        (('pos="0 0 0.3"', 'pos="0 0 0.3" euler="0 0 90"'), "could walk around them"),
+    ],
+    ids=["in the plane", "askew", "about z", "any way", "beside", "turned"],
+)
+def test_a_custom_robot_meets_every_obstacle(change: tuple[str, str], sentence: str, texts: Texts) -> None:
+    robot = texts.robot(PLANAR.replace(*change, 1))
+    Locomotion(robot=robot)
+    if not sentence:
+        assert Obstacles(robot=robot).robot is robot
+    else:
+        with pytest.raises(UserError, match=sentence):
+            Obstacles(robot=robot)
 
 
 ASSETS = sorted((Path(gymnasium.__file__).parent / "envs/mujoco/assets").glob("*.xml"))

@@ -27,10 +27,14 @@ WRONG: Any = "steep"
     ("build", "sentence"),
     [
         (lambda: DeceptiveMaze(difficulty=WRONG), "no difficulty named 'steep'.* Known: difficult, easy"),
+        (lambda: SteppingStones(within=math.nan), "stepping_stones has within=nan. Write a finite distance above 0"),
+        (lambda: SteppingStones(within=math.inf), "stepping_stones has within=inf. Write a finite distance above 0"),
         (lambda: Obstacles(heights=WRONG), "no profile of heights named 'steep'.* Known: hierarchical, high, medium"),
     ],
 )
-def test_an_unknown_variant_of_a_task_is_told_the_known_ones(build: Callable[[], object], sentence: str) -> None:
+def test_a_wrong_word_or_number_of_a_task_is_told_what_may_stand_there(
+    build: Callable[[], object], sentence: str
+) -> None:
     with pytest.raises(UserError, match=sentence):
         build()
 

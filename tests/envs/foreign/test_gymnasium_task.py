@@ -65,6 +65,14 @@ def test_it_has_the_environment_s_sizes_and_limit() -> None:
     assert (several.observation_size, several.action_size) == (45, 2)
 
 
+@pytest.mark.parametrize("wrong", [0, -1])
+def test_an_episode_has_a_step(wrong: int) -> None:
+    with pytest.raises(UserError, match=f"CartPole-v1's episode_steps must be at least 1, not {wrong}"):
+        GymnasiumTask("CartPole-v1", episode_steps=wrong)
+    with pytest.raises(UserError, match="CartPole-v1's episode_steps must be a whole number, not 2.5"):
+        GymnasiumTask("CartPole-v1", episode_steps=2.5)  # type: ignore[arg-type]
+
+
 def trains(task: Any, seed: int, budget: Any) -> Any:
     raise AssertionError("no training begins")
 
@@ -82,6 +90,10 @@ def test_an_unknown_environment_or_setting_is_a_sentence() -> None:
         GymnasiumTask("CartPole-v9").make()
     with pytest.raises(UserError, match="Gymnasium cannot make 'CartPole-v1' with {'wheels': 4}"):
         GymnasiumTask("CartPole-v1", {"wheels": 4}).make()
+    with pytest.raises(UserError, match="Gymnasium cannot make 'FrozenLake-v1' with .*: KeyError 'bad'. Check"):
+        GymnasiumTask("FrozenLake-v1", {"map_name": "bad"}).make()
+    with pytest.raises(UserError, match=r"CartPole-v1 has providers='ale-py'\. Write a tuple, such as"):
+        GymnasiumTask("CartPole-v1", providers="ale-py")  # type: ignore[arg-type]
 
 
 def test_a_method_that_is_compiled_says_what_to_do_instead(store_of: Store) -> None:

@@ -18,7 +18,7 @@ import pytest
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.envs.foreign.brax_task import BraxTask
 from evoclaims.envs.foreign.gymnax_task import GymnaxTask
-from evoclaims.envs.foreign.jax_task import Choice, Descriptor, Range, actions_of
+from evoclaims.envs.foreign.jax_task import Choice, Descriptor, Moment, Range, actions_of
 from evoclaims.methods.cma_es import CmaEs
 from evoclaims.methods.map_elites import MapElites
 from evoclaims.methods.neat.evolution import Neat
@@ -177,6 +177,40 @@ def test_a_number_that_is_not_finite_ends_the_episode() -> None:
         assert np.array_equal(before, after, equal_nan=True)
 
 
+@pytest.mark.parametrize("how", ["truncated", "reward", "observation"])
+def test_a_policy_scores_the_same_in_both_examinations(how: str) -> None:
+    class Ending(BraxTask):
+        def begin(self, key: Any) -> Any:
+            moment = super().begin(key)
+            return replace(moment, state=jnp.int32(0))
+
+        def advance(self, key: Any, state: Any, action: Any) -> Any:
+            over = state >= 3  # after the fourth step, and, where nobody stops there, ever after
+            changed = {
+                "truncated": {"truncated": over},
+                "reward": {"reward": jnp.where(over, jnp.inf, 0.7)},
+                "observation": {"observation": jnp.where(over, jnp.nan, jnp.zeros(2))},
+            }[how]
+            plain = {"observation": jnp.zeros(2), "reward": jnp.float32(0.7), "truncated": jnp.zeros((), bool)}
+            return Moment(state=state + 1, terminated=jnp.zeros((), bool), **{**plain, **changed})
+
+    task = Ending("fast", episode_steps=12, examined_episodes=2, solved_at=3 * 0.7)  # a float32 is below this
+    compiled = task.examine(lambda observation: jnp.zeros(1), jax.random.key(0), jnp.int32(0))
+    fitness, success, metrics = task.examine_natively(lambda observation: np.zeros(1), 0)
+    assert fitness == pytest.approx(0.7 * (4 if how == "truncated" else 3)) == compiled.fitness
+    assert success == 1.0 == compiled.success
+    assert metrics == {"episode_steps": 4.0} == compiled.metrics
+
+
+def test_a_policy_of_a_training_loop_returns_as_many_numbers_as_an_action_has() -> None:
+    assert FAST.examine_natively(lambda observation: [[0.5]], 0)[2]["episode_steps"] > 0
+    for wrong in ([0.5, 0.5], [], None, "up"):
+        with pytest.raises(
+            UserError, match=r"returned .* on fast, where an action is an array of shape \(1,\)\. Return"
+        ):
+            FAST.examine_natively(lambda observation, wrong=wrong: wrong, 0)
+
+
 def test_wrong_names_and_what_map_elites_needs_are_sentences() -> None:
     with pytest.raises(UnknownNameError, match="no environment of Brax named 'antt'. Did you mean 'ant'"):
         BraxTask("antt").make()
@@ -186,6 +220,13 @@ def test_wrong_names_and_what_map_elites_needs_are_sentences() -> None:
         BraxTask("fast", episode_steps=0)
     with pytest.raises(UserError, match="examined_episodes must be at least 1, not 0"):
         BraxTask("fast", examined_episodes=0)
+    with pytest.raises(UserError, match="CartPole-v1's max_steps_in_episode must be at least 1, not -1"):
+        GymnaxTask("CartPole-v1", {"max_steps_in_episode": -1})  # each episode would end at once
+    with pytest.raises(UserError, match="fast's solved_at must be a finite number, not '1'"):
+        BraxTask("fast", solved_at="1")  # type: ignore[arg-type]
+    for wrong in (("fast", 3), (3, {})):
+        with pytest.raises(UserError, match=r"BraxTask\(.*\) does not name an environment and its settings"):
+            BraxTask(*wrong)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("places", [(0,), (0, 1, 2), (-1, 0), (0.5, 1)])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import pytest
@@ -41,6 +42,7 @@ def test_settings_are_told_apart_by_their_numbers() -> None:
         {"mutate_rate": 0.7, "replace_rate": 0.4},
         {"std": -1.0},
         {"power": -0.1},
+        {"power": math.inf},
         {"bound": 0.0},
     ],
 )
@@ -52,7 +54,7 @@ def test_impossible_attributes_are_refused(wrong: dict[str, Any]) -> None:
 @pytest.mark.parametrize(
     "name", ["node_add", "node_delete", "connection_add", "connection_delete", "activation_replace"]
 )
-@pytest.mark.parametrize("value", [-0.1, 1.1])
+@pytest.mark.parametrize("value", [-0.1, 1.1, 2])
 def test_what_is_no_probability_is_refused_by_its_name(name: str, value: float) -> None:
     with pytest.raises(UserError, match=f"{name}={value}. Write a number from 0 to 1"):
         Mutation(**{name: value})

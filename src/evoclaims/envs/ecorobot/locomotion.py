@@ -6,15 +6,16 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Final, Literal, get_args
 
 import jax.numpy as jnp
+import mujoco
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from evoclaims.core.errors import require_known
+from evoclaims.core.errors import UserError, require_known
 from evoclaims.core.pytree import pytree
 from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.pose import Pose
 from evoclaims.envs.ecorobot.robot_task import ROBOT_PACKAGES, Outing, RobotTask, Ruling
-from evoclaims.envs.ecorobot.robots import HALF_CHEETAH, Robot
+from evoclaims.envs.ecorobot.robots import HALF_CHEETAH, Robot, is_built_in_and_planar
 
 
 def forward(
@@ -62,6 +63,8 @@ HALF_THICKNESS: Final = 0.2
 DEPTH: Final = 1.0
 """How far obstacles reach below their top, m: one size for all, so that they differ only in place."""
 
+_TINY: Final = 1e-6
+
 
 @pytree
 class FurthestRun:
@@ -78,7 +81,7 @@ class Obstacles(RobotTask):
         heights: of their tops: "hierarchical" (five of 0.1 m, five of 0.2 m, five of 0.3 m), "medium" (all 0.2 m) or
             "high" (all 0.3 m).
 
-    The corridor's walls at y = ±3 are left out: the half-cheetah moves in the plane y = 0.
+    The corridor's walls at y = ±3 are left out: the half-cheetah moves in the plane y = 0. Other robots have to, too.
     """
 
     name: ClassVar[str] = "obstacles"
@@ -89,9 +92,34 @@ class Obstacles(RobotTask):
     heights: Heights = "hierarchical"
 
     def __post_init__(self) -> None:
-        """Check the name of the heights."""
+        """Check the name of the heights, and that the robot cannot walk around the obstacles."""
         super().__post_init__()
         require_known("profile of heights", self.heights, get_args(Heights))
+        if not is_built_in_and_planar(self.robot):  # those need not be compiled
+            self._require_plane()
+
+    def _require_plane(self) -> None:
+        """Check that the robot starts before the obstacles, and that its torso stays in the plane y = 0."""
+        model, name = self.scene.whole, self.robot.name
+        data = mujoco.MjData(model)
+        data.qpos[:] = self.scene.start
+        mujoco.mj_kinematics(model, data)
+        joints = np.flatnonzero(model.jnt_bodyid == 1)
+        along, across = np.abs(data.xaxis[joints, 1]), np.hypot(data.xaxis[joints, 0], data.xaxis[joints, 2])
+        kinds = model.jnt_type[joints]
+        stays = np.where(kinds == mujoco.mjtJoint.mjJNT_SLIDE, along, across) < _TINY
+        if not np.all(stays & np.isin(kinds, (mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE))):
+            raise UserError(
+                f"{self.name} has no walls at the ends of its obstacles, and the robot {name} could walk around them. "
+                "Use a robot whose torso slides only along x and z and turns only about y, such as HALF_CHEETAH."
+            )
+        x, y, _ = data.xpos[1]
+        first = min(self.obstacle_places) - HALF_THICKNESS
+        if x >= first or abs(y) >= _TINY:
+            raise UserError(
+                f"The robot {name} starts at x {x:g} and y {y:g}, but the first obstacle of {self.name} begins at "
+                f"x {first:g} and all are in the middle at y 0. Place its torso before it, at y 0."
+            )
 
     @property
     def obstacle_places(self) -> tuple[float, ...]:

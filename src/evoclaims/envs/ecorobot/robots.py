@@ -239,6 +239,11 @@ IN_A_MAZE: Final = (SIMPLE_ROB, ANT, HUMANOID)
 """Built-in robots that move in x and y; the others move in the plane of x and z."""
 
 
+def is_built_in_and_planar(robot: Robot) -> bool:
+    """Whether a robot is a built-in one, in all that depends on the model, that moves in the plane of x and z."""
+    return fits_as_built_in(robot, in_a_maze=False) and not fits_as_built_in(robot, in_a_maze=True)
+
+
 def fits_as_built_in(robot: Robot, *, in_a_maze: bool) -> bool:
     """Whether a robot is a built-in one in all that depends on the model; one that can start anywhere in a maze."""
     names = ("xml", "start", "free_coordinates", "seen_velocities", "scales_actions")

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar, Final
 
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
+from evoclaims.core.errors import UserError
 from evoclaims.core.pytree import pytree
 from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.maze import Maze, MazePlan
@@ -58,6 +60,12 @@ class SteppingStones(Maze):
 
     within: float = 0.1
     shows_goal: bool = False
+
+    def __post_init__(self) -> None:
+        """Check the distance."""
+        super().__post_init__()
+        if not 0 < self.within < math.inf:
+            raise UserError(f"{self.name} has within={self.within}. Write a finite distance above 0, in m.")
 
     @property
     def stones(self) -> tuple[tuple[float, float], ...]:

@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 import jax.numpy as jnp
 from jaxtyping import Array, PRNGKeyArray
 
-from evoclaims.core.errors import UserError, require_known
+from evoclaims.core.errors import require_known
 from evoclaims.envs.foreign.jax_task import JaxTask, Moment, Range
 
 
@@ -28,10 +28,15 @@ class BraxTask(JaxTask):
         settings: its further arguments.
     """
 
-    revision: ClassVar[int] = 1
+    revision: ClassVar[int] = 2
     packages: ClassVar[tuple[str, ...]] = ("brax", "mujoco", "mujoco-mjx")
 
     settings: Mapping[str, Any] = field(default_factory=dict, hash=False, kw_only=False)
+
+    @property
+    def given(self) -> Mapping[str, Any]:
+        """The settings."""
+        return self.settings
 
     def make(self) -> Any:
         """Return Brax's environment, which neither truncates episodes nor resets itself.
@@ -45,13 +50,8 @@ class BraxTask(JaxTask):
             from brax import envs
 
             require_known("environment of Brax", self.environment_id, envs._envs)
-            try:
+            with self.making("Brax"):
                 return envs.get_environment(self.environment_id, **self.settings)
-            except (TypeError, ValueError) as error:
-                raise UserError(
-                    f"Brax cannot make {self.environment_id!r} with {dict(self.settings)}: "
-                    f"{str(error).removesuffix('.')}. Check the name and the settings."
-                ) from error
 
     @cached_property
     def actions(self) -> Range:

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
-from evoclaims.core.errors import UserError
+from evoclaims.core.errors import UserError, require_at_least
 from evoclaims.envs.base import Task
 from evoclaims.envs.foreign.native_actions import native_action
 from evoclaims.envs.foreign.scoring import ForeignTask, Scored
@@ -39,6 +39,19 @@ class GymnasiumTask(ForeignTask):
     episode_steps: int | None = None
     providers: tuple[str, ...] = field(default=(), metadata={"canonical": False})
 
+    def __post_init__(self) -> None:
+        """Check the counts."""
+        super().__post_init__()
+        if self.episode_steps is not None:  # Gymnasium takes -1 for none
+            require_at_least(1, f"{self.name}'s", episode_steps=self.episode_steps)
+        if not isinstance(self.providers, tuple):  # a word would be as many packages as it has letters
+            raise UserError(f'{self.name} has providers={self.providers!r}. Write a tuple, such as ("ale-py",).')
+
+    @property
+    def given(self) -> Mapping[str, Any]:
+        """The settings."""
+        return self.settings
+
     @property
     def packages(self) -> tuple[str, ...]:
         """The distributions that compute it."""
@@ -56,13 +69,8 @@ class GymnasiumTask(ForeignTask):
             raise UserError(
                 f"{self.name} needs Gymnasium, which cannot be imported ({error}). Install it: pip install gymnasium."
             ) from error
-        try:
+        with self.making("Gymnasium"):
             return gymnasium.make(self.environment_id, max_episode_steps=self.episode_steps, **self.settings)
-        except (gymnasium.error.Error, TypeError, ModuleNotFoundError) as error:
-            raise UserError(
-                f"Gymnasium cannot make {self.environment_id!r} with {dict(self.settings)}: "
-                f"{str(error).removesuffix('.')}. Check the name and the settings."
-            ) from error
 
     @cached_property
     def observation_size(self) -> int:

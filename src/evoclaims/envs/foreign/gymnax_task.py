@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Final
 
 import jax.numpy as jnp
 from jaxtyping import Array, PRNGKeyArray
 
-from evoclaims.core.errors import UserError
+from evoclaims.core.errors import UserError, require_at_least
 from evoclaims.envs.foreign.jax_task import Choice, JaxTask, Moment, Range, actions_of
+
+_LIMIT: Final = "max_steps_in_episode"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,10 +25,20 @@ class GymnaxTask(JaxTask):
         parameters: fields of the environment's parameters that differ from the default.
     """
 
-    revision: ClassVar[int] = 2
+    revision: ClassVar[int] = 3
     packages: ClassVar[tuple[str, ...]] = ("gymnax",)
 
     parameters: Mapping[str, Any] = field(default_factory=dict, hash=False, kw_only=False)
+
+    def __post_init__(self) -> None:
+        """Check the numbers, the environment's own limit of steps among them."""
+        super().__post_init__()
+        require_at_least(1, f"{self.name}'s", **{_LIMIT: self.parameters.get(_LIMIT, 1)})
+
+    @property
+    def given(self) -> Mapping[str, Any]:
+        """The parameters."""
+        return self.parameters
 
     def make(self) -> tuple[Any, Any]:
         """Return gymnax's environment and its parameters.
@@ -40,14 +52,9 @@ class GymnaxTask(JaxTask):
             raise UserError(
                 f"{self.name} needs gymnax, which cannot be imported ({error}). Install it: pip install gymnax."
             ) from error
-        try:
+        with self.making("gymnax"):
             environment, parameters = gymnax.make(self.environment_id)
             return environment, parameters.replace(**self.parameters)
-        except (ValueError, TypeError) as error:
-            raise UserError(
-                f"gymnax cannot make {self.environment_id!r} with {dict(self.parameters)}: "
-                f"{str(error).removesuffix('.')}. Check the name and the parameters."
-            ) from error
 
     @cached_property
     def actions(self) -> Choice | Range:
@@ -67,7 +74,7 @@ class GymnaxTask(JaxTask):
         environment, parameters = self._made
         observation, state, reward, done, _ = environment.step_env(key, state, action, parameters)
         done, truncated = jnp.asarray(done, bool), jnp.zeros((), bool)
-        limit = getattr(parameters, "max_steps_in_episode", None)
+        limit = getattr(parameters, _LIMIT, None)
         if limit is not None and hasattr(state, "time"):  # gymnax does not say which of both has ended an episode
             longer = parameters.replace(max_steps_in_episode=limit + 1)
             truncated = done & (state.time >= limit) & ~jnp.asarray(environment.is_terminal(state, longer), bool)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import count
 from typing import Any
 
 import jax
@@ -20,7 +21,7 @@ from evoclaims.core.foreign import implicit_promotions
 from evoclaims.core.keys import EVALUATION, streams, trial_key
 from evoclaims.core.pytree import pytree, select, strong
 from evoclaims.envs.base import Episode, PolicyFn, TaskState, averaged, fitting, played
-from evoclaims.envs.foreign.native_actions import choice
+from evoclaims.envs.foreign.native_actions import array_action, choice
 from evoclaims.envs.foreign.scoring import ForeignTask, Scored
 
 
@@ -186,6 +187,11 @@ class JaxTask(ForeignTask):
         """Act once, by an action of the environment's own."""
 
     @property
+    def threshold(self) -> float:
+        """The return that solves an episode, in the 32 bits that returns have: else none would be equal to 0.7."""
+        return float(np.float32(super().threshold))
+
+    @property
     def horizon(self) -> int:
         """Environment steps of the longest episode."""
         return self.episode_steps
@@ -220,22 +226,31 @@ class JaxTask(ForeignTask):
         inner: Inner = state.inner
         step_key, later_key = streams(jax.random.wrap_key_data(inner.key), "step", "later")
         with implicit_promotions():
-            moment = self.advance(step_key, inner.state, self.actions.chosen(fitting(self, action)))
-        observation = _flat(moment.observation)
-        sound = jnp.all(jnp.isfinite(observation)) & jnp.isfinite(moment.reward)
+            found = self.advance(step_key, inner.state, self.actions.chosen(fitting(self, action)))
+        moment, sound = self._ruled(found, inner.time + 1)
         reached = strong(
             Inner(
                 state=select(sound, moment.state, inner.state), key=jax.random.key_data(later_key), time=inner.time + 1
             )
         )
-        terminated = moment.terminated | ~sound
         return TaskState(
-            observation=jnp.where(sound, observation, state.observation),
-            reward=jnp.where(sound, moment.reward, 0.0),
-            terminated=terminated,
-            truncated=(moment.truncated | (reached.time >= self.episode_steps)) & ~terminated,
+            observation=jnp.where(sound, _flat(moment.observation), state.observation),
+            reward=moment.reward,
+            terminated=moment.terminated,
+            truncated=moment.truncated,
             inner=reached,
         )
+
+    def _ruled(self, moment: Moment, steps: Int[Array, ""]) -> tuple[Moment, Bool[Array, ""]]:
+        """Return what counts of the moment after some steps, and whether its numbers are finite.
+
+        Each examination follows this rule, so that a policy scores the same whatever has trained it.
+        """
+        sound = jnp.all(jnp.isfinite(_flat(moment.observation))) & jnp.isfinite(moment.reward)
+        terminated = moment.terminated | ~sound
+        truncated = (moment.truncated | (steps >= self.episode_steps)) & ~terminated
+        reward = jnp.where(sound, moment.reward, 0.0)
+        return replace(moment, reward=reward, terminated=terminated, truncated=truncated), sound
 
     def episode(self, policy: PolicyFn, key: PRNGKeyArray, level: Int[Array, ""]) -> Episode:
         """Run one episode: fitness is its return, success whether that is `solved_at` or more."""
@@ -272,21 +287,28 @@ class JaxTask(ForeignTask):
 
     def examine_natively(self, policy: Callable[[Any], Any], seed: int) -> Scored:
         """Run `examined_episodes` of a policy that acts as the environment wants it, on the host, and average."""
-        begin, advance, actions = jax.jit(self.begin), jax.jit(self.advance), self.actions
+        begin, actions = jax.jit(self.begin), self.actions
 
-        def native(action: Any) -> Array:
-            return jnp.asarray(choice(action, 0, actions.size, self.name) if isinstance(actions, Choice) else action)
+        def native(action: Any) -> Any:
+            if isinstance(actions, Choice):
+                return choice(action, 0, actions.size, self.name)
+            return array_action(actions.shape, action, self.name)
+
+        @jax.jit
+        def advance(key: Array, state: Any, action: Array, steps: Array) -> Moment:
+            return self._ruled(self.advance(key, state, action), steps)[0]
 
         def one(key: Array) -> tuple[float, int]:
             key, begin_key = jax.random.split(key)
-            moment, total = begin(begin_key), 0.0
-            for step in range(1, self.episode_steps + 1):
+            moment, total = begin(begin_key), np.float32(0.0)
+            for step in count(1):
                 key, step_key = jax.random.split(key)
-                moment = advance(step_key, moment.state, native(policy(np.asarray(moment.observation))))
-                total += float(moment.reward)
-                if moment.terminated:
-                    return total, step
-            return total, self.episode_steps
+                action = jnp.asarray(native(policy(np.asarray(moment.observation))))
+                moment = advance(step_key, moment.state, action, np.int32(step))
+                total += np.float32(moment.reward)
+                if moment.terminated or moment.truncated:
+                    break
+            return float(total), step
 
         with implicit_promotions():
             return self.scores(map(one, jax.random.split(trial_key(seed, EVALUATION), self.examined_episodes)))

@@ -10,6 +10,7 @@ from numbers import Real
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from evoclaims.core.errors import UserError
 
@@ -44,21 +45,44 @@ def native_action(space: Any, action: Any, task: str) -> Any:
         return choice(action, int(getattr(space, "start", 0)), int(space.n), task)
     if not isinstance(space.shape, tuple) or space.dtype is None or space.dtype.kind not in "biuf":
         return action
+    array = _numbers(action, space.shape)
+    if array is not None and space.dtype.kind != "f":  # several choices
+        numbers = array
+        array = np.nan_to_num(numbers).astype(space.dtype)
+        array = array if bool((array == numbers).all()) and array in space else None
+    if array is None:
+        raise _misfit(action, f"{space.shape} in {space}", task)
+    return array
+
+
+def array_action(shape: tuple[int, ...], action: Any, task: str) -> NDArray[Any]:
+    """Return an action that is an array of this shape; jax would broadcast another one.
+
+    Raises:
+        UserError: for an array of another size or not of numbers.
+    """
+    array = _numbers(action, shape)
+    if array is None:
+        raise _misfit(action, str(shape), task)
+    return array
+
+
+def _numbers(action: Any, shape: tuple[int, ...]) -> NDArray[Any] | None:
+    """Return an action's numbers in a shape, the action itself where it has it; None where it has not as many."""
     try:
         array = np.asarray(action)
-        fits = array.size == math.prod(space.shape) and array.dtype.kind in "biuf"
     except (TypeError, ValueError, RuntimeError):  # no numbers; or a tensor that is part of a graph
-        fits = False
-    if fits and space.dtype.kind != "f":  # several choices
-        numbers = array.reshape(space.shape)
-        array = np.nan_to_num(numbers).astype(space.dtype)
-        fits = bool((array == numbers).all()) and array in space
-    if not fits:
-        raise UserError(
-            f"The policy returned {_shown(action)} on {task}, where an action is an array of shape {space.shape} in "
-            f"{space}. Return such an array of numbers."
-        )
-    return action if array is action and array.shape == space.shape else array.reshape(space.shape)
+        return None
+    if array.size != math.prod(shape) or array.dtype.kind not in "biuf":
+        return None
+    return array if array.shape == shape else array.reshape(shape)
+
+
+def _misfit(action: Any, where: str, task: str) -> UserError:
+    return UserError(
+        f"The policy returned {_shown(action)} on {task}, where an action is an array of shape {where}. Return such an "
+        "array of numbers."
+    )
 
 
 def _only_number(action: Any) -> float | None:

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from statistics import fmean
 from typing import Any, ClassVar
 
-from evoclaims.core.errors import require_at_least
+from evoclaims.core.errors import UserError, require_at_least, require_finite
 
 Scored = tuple[float, float, Mapping[str, float]]
 """Fitness, success and metrics of a policy, as a task's `examine` has them."""
@@ -35,8 +36,35 @@ class ForeignTask(ABC):
     solved_at: float | None = None
 
     def __post_init__(self) -> None:
-        """Check the count."""
+        """Check the names and numbers."""
+        if not isinstance(self.environment_id, str) or not isinstance(self.given, Mapping):
+            raise UserError(
+                f"{type(self).__name__}({self.environment_id!r}, {self.given!r}) does not name an environment and its "
+                'settings. Write a name and a table, such as ("CartPole-v1", {"sutton_barto_reward": True}).'
+            )
         require_at_least(1, f"{self.name}'s", examined_episodes=self.examined_episodes)
+        if self.solved_at is not None:
+            require_finite(f"{self.name}'s", solved_at=self.solved_at)
+
+    @property
+    def given(self) -> Mapping[str, Any]:
+        """What the library makes it with, besides the name."""
+        return {}
+
+    @contextmanager
+    def making(self, library: str) -> Iterator[None]:
+        """Turn what a library raises while it makes the environment into a `UserError`."""
+        try:
+            yield
+        except UserError:
+            raise
+        except Exception as error:  # each environment has its own way to refuse a setting
+            text = str(error).removesuffix(".")
+            said = f"{type(error).__name__} {text}".rstrip() if isinstance(error, LookupError) or not text else text
+            raise UserError(
+                f"{library} cannot make {self.environment_id!r} with {dict(self.given)}: {said}. Check the name and "
+                "the settings."
+            ) from error
 
     @property
     def name(self) -> str:

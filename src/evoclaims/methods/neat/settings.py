@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
 from typing import Literal, get_args
 
@@ -34,9 +35,9 @@ class Attribute:
 
     def __post_init__(self) -> None:
         """Check the probabilities and sizes."""
-        if self.std < 0 or self.power < 0 or self.bound <= 0:
+        if not (0 <= self.std < math.inf and 0 <= self.power < math.inf and self.bound > 0):
             raise UserError(
-                f"An attribute has std={self.std}, power={self.power} and bound={self.bound}. Write a std and a "
+                f"An attribute has std={self.std}, power={self.power} and bound={self.bound}. Write a finite std and "
                 "power of at least 0, and a bound above 0."
             )
         if self.mutate_rate < 0 or self.replace_rate < 0 or self.mutate_rate + self.replace_rate > 1:
@@ -63,7 +64,7 @@ class Mutation:
         """Check the probabilities."""
         for field in fields(self):
             value = getattr(self, field.name)
-            if isinstance(value, float) and not 0 <= value <= 1:
+            if isinstance(value, int | float) and not 0 <= value <= 1:
                 raise UserError(f"A probability of NEAT is {field.name}={value}. Write a number from 0 to 1.")
 
 
