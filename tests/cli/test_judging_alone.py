@@ -183,11 +183,9 @@ def test_f(trials, verdict):
 """
 
 
-def test_commands_judge_a_claim_during_its_call_as_pytest_does(
-    project: Project, evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_commands_judge_a_claim_during_its_call_as_pytest_does(project: Project, evoclaims: Evoclaims) -> None:
     """What its fixtures have set is there, its trials can be looked at, and a part of it may skip it."""
-    monkeypatch.delitem(sys.modules, "tiny_paper", raising=False)
+    sys.modules.pop("tiny_paper", None)
     project.pytester.makepyfile(tiny_paper=REPRODUCTION.replace("conditions(2), Design", "conditions(1), Design"))
     project.write(DURING_THE_CALL)
     status, out, _ = evoclaims("status")

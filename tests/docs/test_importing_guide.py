@@ -44,7 +44,7 @@ def test_the_guide_s_table_is_judged_and_at_the_full_tier_it_needs_no_smoke_tier
         (pytester.path / name).write_text(text if tier == "smoke" else text.replace('("smoke", "full")', '("full",)'))
     (pytester.path / "runs.csv").write_text(table)
     pytester.makepyprojecttoml('[tool.evoclaims]\nreproduction = "our_paper"\n[tool.pytest.ini_options]\n')
-    monkeypatch.delitem(sys.modules, "our_paper", raising=False)
+    sys.modules.pop("our_paper", None)
     monkeypatch.setenv("COLUMNS", "160")
     result = pytester.runpytest_inprocess("claims", "-m", tier)
     result.stdout.fnmatch_lines(["R1 *NEAT earns more than PPO (Table 1) * supported *10 * 1.00 *"])

@@ -203,14 +203,12 @@ def test_exported_trials_give_the_verdict_that_they_gave_before(ours: Project, t
     assert [one["outcome"], one["reason"]] == [other["outcome"], other["reason"]] == ["supported", other["reason"]]
 
 
-def test_a_changed_table_is_compared_with_the_reference_trials_of_the_one_before(
-    ours: Project, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_changed_table_is_compared_with_the_reference_trials_of_the_one_before(ours: Project) -> None:
     ours.run(own_store=True)
     assert cli.main(["reference"]) == 0
     ours.run(own_store=True).stdout.fnmatch_lines(["reference trials: 2 comparisons, 0 drifted*"])
     (ours.path / "runs.csv").write_text(_table(_numbers(0.6), _numbers(0.3)))
-    monkeypatch.delitem(sys.modules, "our_paper")  # which has read the table
+    sys.modules.pop("our_paper", None)  # which has read the table
     result = ours.run(own_store=True)
     result.stdout.fnmatch_lines(
         [
@@ -220,14 +218,12 @@ def test_a_changed_table_is_compared_with_the_reference_trials_of_the_one_before
     )
 
 
-def test_a_table_without_some_of_the_reference_trials_is_told_even_if_no_test_finds_a_drift(
-    ours: Project, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_table_without_some_of_the_reference_trials_is_told_even_if_no_test_finds_a_drift(ours: Project) -> None:
     whole = _table(_numbers(0.8, 14), _numbers(0.3))
 
     def judged(table: str) -> str:
         (ours.path / "runs.csv").write_text(table)
-        monkeypatch.delitem(sys.modules, "our_paper", raising=False)  # which has read the table
+        sys.modules.pop("our_paper", None)  # which has read the table
         return ours.run(own_store=True).stdout.str()
 
     judged(whole)

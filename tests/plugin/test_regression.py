@@ -194,8 +194,8 @@ def test_a_claim_that_is_judged_otherwise_begins_a_new_history(accepted: Any) ->
     )
 
 
-def test_a_new_history_names_the_changed_setting(accepted: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delitem(sys.modules, "tiny_paper", raising=False)
+def test_a_new_history_names_the_changed_setting(accepted: Any) -> None:
+    sys.modules.pop("tiny_paper", None)
     edited = REPRODUCTION.replace('"right": HandBuilt()', '"right": HandBuilt(negated=True)')
     accepted.pytester.makepyfile(tiny_paper=edited)
     accepted.run().stdout.fnmatch_lines(
