@@ -13,6 +13,9 @@ import unpacked
 from tiny_project import Project
 
 from evoclaims import cli
+from evoclaims.cli.project import open_project
+from evoclaims.figures.figure import Scope
+from evoclaims.figures.trial_numbers import read
 from evoclaims.trials.store import Store
 
 PAPER = """
@@ -135,6 +138,34 @@ def test_too_few_trials_are_inconclusive_and_say_how_many_it_needs(
     outcome, reason = _judged(ours, f"-m{tier}")
     assert outcome == "inconclusive"
     assert reason.startswith(said)
+
+
+def test_imported_trials_count_from_0_whatever_the_first_seed_of_the_design(
+    ours: Project, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Beside trials that are run, which have the design's seeds."""
+    paper = (ours.path / "our_paper.py").read_text()
+    (ours.path / "our_paper.py").write_text(
+        paper.replace("Design.fixed(10)", "Design((Look(10, 0.05),), first_seed=100)")
+    )
+    ours.write(a=BETTER, b="verdict(trials('right', on='parity').mean_success > 0.9)")
+    assert "claims: 2 supported\n" in ours.run(own_store=True).stdout.str()
+    opened = open_project(".evoclaims")
+    scope = Scope(opened.archive, opened.reproduction, "smoke")
+    drawn = {
+        method: read(scope, method, "parity", lambda trials: trials.mean_success) for method in ("right", "theirs")
+    }
+    assert [number.seed for number in drawn["right"].each] == list(range(100, 110))
+    assert [number.seed for number in drawn["theirs"].each] == list(range(10))
+    assert all(len(of.values) == 10 for of in drawn.values())
+    assert cli.main(["reference"]) == 0
+    assert capsys.readouterr().out.count(": 10 trials") == 3
+    assert cli.main(["accept", "--tier=smoke"]) == 1  # something was written
+    (ours.path / "runs.csv").write_text(_table(_numbers(0.9), _numbers(0.3)))
+    monkeypatch.delitem(sys.modules, "our_paper")  # which has read the old one
+    assert (
+        "supported under the old rules: of theirs on parity, imported.sha256 " in ours.run(own_store=True).stdout.str()
+    )
 
 
 def test_plan_says_beforehand_that_a_table_is_too_short(ours: Project, capsys: pytest.CaptureFixture[str]) -> None:

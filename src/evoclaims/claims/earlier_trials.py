@@ -81,7 +81,7 @@ def upgraded(session: Session, reports: Sequence[ClaimReport]) -> Upgrade:
         here = condition.versions
         now = tuple(trial for trial in trials if agree(trial.provenance, here))
         design = session.reproduction.tier(used.tier).design
-        seeds = {*design.seeds(design.last.n), *(trial.seed for trial in now)}
+        seeds = {*design.seeds(design.last.n, bool(condition.existing)), *(trial.seed for trial in now)}
         others = (session.store.others(TrialSpec(condition, seed).id, here) for seed in seeds)
         before = predecessors([record for several in others for record in several], condition.packages)
         if now and before and len(now) == len(trials):
@@ -170,7 +170,10 @@ def _new_history(session: Session, report: ClaimReport, old: AcceptedVerdict, st
     now = {source.label: tier.condition(source.method, source.task) for source in report.sources}
     folder = session.reproduction.references_of(session.variant)
     own = [references.committed(folder, report.tier, source.method, source.task) for source in report.sources]
-    groups = [_by_condition([*stored, *trials], set(tier.design.seeds(old.n))) for trials in own]
+    groups = [
+        _by_condition([*stored, *trials], set(tier.design.seeds(old.n, bool(condition.existing))))
+        for trials, condition in zip(own, now.values(), strict=True)
+    ]
     for alike in (2, 1):  # names of method and task that stayed: an edit seldom changes both
         sides = [
             [trials for trials in of_source if _alike(trials[0].spec, condition.plain) >= alike]
