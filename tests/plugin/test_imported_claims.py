@@ -121,6 +121,7 @@ def test_a_new_history_names_the_edited_table(ours: Project) -> None:
     shown = ours.run(own_store=True).stdout.str()
     assert "a (smoke): a new history begins, " in shown
     assert "of theirs on parity, imported.sha256 " in shown
+    assert "imported.where" not in shown  # rows of the same algorithm are compared
 
 
 @pytest.mark.parametrize(
