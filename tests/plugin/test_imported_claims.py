@@ -148,6 +148,11 @@ def test_imported_trials_count_from_0_whatever_the_first_seed_of_the_design(
     paper = (ours.path / "our_paper.py").read_text()
     (ours.path / "our_paper.py").write_text(
         paper.replace("Design.fixed(10)", "Design((Look(10, 0.05),), first_seed=100)")
+        .replace("import tiny_paper", "import tiny_paper\nfrom evoclaims import NullAgent")
+        .replace(
+            "Path(__file__).parent,",
+            "Path(__file__).parent, null_agents={'right': NullAgent('x', method='right')}, tiers=",
+        )
     )
     ours.write(a=BETTER, b="verdict(trials('right', on='parity').mean_success > 0.9)")
     assert "claims: 2 supported\n" in ours.run(own_store=True).stdout.str()
@@ -161,6 +166,10 @@ def test_imported_trials_count_from_0_whatever_the_first_seed_of_the_design(
     assert all(len(of.values) == 10 for of in drawn.values())
     assert cli.main(["reference"]) == 0
     assert capsys.readouterr().out.count(": 10 trials") == 3
+    cli.main(["audit", "--tier=smoke"])
+    assert (
+        "\n  right (too many trials are copies of each other): a\n" in capsys.readouterr().out
+    )  # those of its own seeds
     assert cli.main(["accept", "--tier=smoke"]) == 1  # something was written
     (ours.path / "runs.csv").write_text(_table(_numbers(0.9), _numbers(0.3)))
     del sys.modules["our_paper"]  # which has read the old one
