@@ -220,6 +220,41 @@ def test_a_measure_that_the_table_lacks_is_an_error_with_those_that_it_has(ours:
     assert said in reason
 
 
+@pytest.mark.parametrize(
+    ("asserted", "said"),
+    [
+        (
+            "event('e', lambda t: t.metrics['mean_success'] > 0.801).in_every_trial()",
+            "seeds 0 (10 in the table), 1 (13 in",
+        ),
+        ("event('e', lambda t: 1).stays()", "in the trial of seed 0 (10 in the table), neither True nor"),
+        (
+            "measure('x', lambda t: float('nan')).between(0, 1)",
+            "NaN in the finished trial of seed 0 (10 in the table) (id ",
+        ),
+    ],
+)
+def test_a_reason_names_a_trial_by_its_seed_in_the_table_too(ours: Project, asserted: str, said: str) -> None:
+    ours.write(a=f"verdict(trials('theirs', on='parity').{asserted})")
+    assert said in _judged(ours)[1]
+
+
+def test_the_page_names_a_trial_by_its_seed_in_the_table_too(ours: Project) -> None:
+    rows = [
+        f"{algo},{seed},{step},{'nan' if seed == step == 12 else 0.01 * step + seed / 1000}\n"
+        for algo in ("good", "bad")
+        for seed in range(10, 20)
+        for step in (11, 12)
+    ]
+    (ours.path / "runs.csv").write_text("algo,seed,at,success\n" + "".join(rows))
+    paper = (ours.path / "our_paper.py").read_text()
+    (ours.path / "our_paper.py").write_text(paper.replace('by="Ada"', 'by="Ada", step="at"'))
+    assert cli.main(["report", "--tier=smoke"]) == 0
+    page = unpacked.read(ours.path / "report" / "index.html")
+    assert "2 of 20 trials diverged and count as the worst result (seeds 2 (12 in the table))." in page
+    assert "seed 0 (10 in the table)" in page  # a line of the training curves
+
+
 def test_a_metric_is_measured_by_its_name(ours: Project) -> None:
     ours.write(a="verdict(trials('theirs', on='parity').measure('mean_success', better='lower').between(0.7, 0.9))")
     assert _judged(ours)[0] == "supported"
@@ -275,8 +310,8 @@ def test_a_table_without_some_of_the_reference_trials_is_told_even_if_no_test_fi
     edited = judged(whole.replace("good,10,0.800\n", "").replace("good,16,0.802\n", "").replace("0.804", "0.814"))
     assert "reference trials: 2 comparisons, 0 drifted" in edited
     assert (
-        "EDITED theirs on parity (smoke), another table: reference trials that are judged no longer: seeds 10, 16 of "
-        "the table; with other numbers: seeds 22 of the table\n"
+        "EDITED theirs on parity (smoke), another table: reference trials that are judged no longer: seeds 10, 16 in "
+        "the table; with other numbers: seeds 22 in the table\n"
     ) in edited
     assert "EDITED" not in judged(whole + "good,1000,0.1\n")
 
