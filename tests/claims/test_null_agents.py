@@ -15,9 +15,9 @@ from evoclaims.judging.assertion import Assertion
 from evoclaims.paper.reproduction import NullAgent, Reproduction
 from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import Store
-from evoclaims.verdicts.claim_report import CONTROL
+from evoclaims.verdicts.claim_report import CONTROL, ClaimReport
 
-Put = Callable[..., tuple[str, ...]]
+Put = Callable[..., ClaimReport]
 
 
 def _still(condition: Condition) -> Any:
@@ -35,7 +35,7 @@ def _value(condition: Condition, seed: int) -> float:
 def put(reproduction: Reproduction, store: Store, says: Claim, served: Any) -> Put:
     """A function that puts an assertion to agents, beside trials of which "better" has 0.5 to 0.59, "worse" to 0.09."""
 
-    def judge(asserted: Callable[[Any], Assertion], where: str = "§1", **agents: NullAgent) -> tuple[str, ...]:
+    def judge(asserted: Callable[[Any], Assertion], where: str = "§1", **agents: NullAgent) -> ClaimReport:
         paper = replace(reproduction, null_agents=agents or {"still": NullAgent("solves nothing", _still)})
         session = Session(paper, store, served(_value))
 
@@ -43,7 +43,7 @@ def put(reproduction: Reproduction, store: Store, says: Claim, served: Any) -> P
             return session.group(method, on, "full")
 
         test = ClaimTest(replace(says, where=where), "full", "")
-        return session.settle(test, asserted(group)).satisfied_by
+        return session.settle(test, asserted(group))
 
     return judge
 
@@ -53,7 +53,7 @@ def _stays(trials: Any, on: str = "small") -> Any:
 
 
 @pytest.mark.parametrize(
-    ("asserted", "satisfied"),
+    ("asserted", "answer"),
     [
         (_stays, True),
         (lambda trials: trials("better").solves_the_last_level.in_most_trials(), False),
@@ -65,26 +65,35 @@ def _stays(trials: Any, on: str = "small") -> Any:
         (lambda trials: _stays(trials) & (trials("better").mean_success > trials("worse").mean_success), False),
         (lambda trials: trials("better").mean_success.equivalent_to(trials("worse").mean_success, margin=0.1), True),
         # It has no number of that name, or cannot stand for the task.
-        (lambda trials: trials("better").reward > -5, False),
-        (lambda trials: _stays(trials, "large"), False),
+        (lambda trials: trials("better").reward > -5, "there is no 'last_fitness'"),
+        (lambda trials: _stays(trials, "large"), "it cannot stand for the conditions"),
+        # It can stand for the claimed side alone.
+        (lambda trials: trials("better").mean_success > trials("worse", "large").mean_success, True),
     ],
 )
-def test_an_agent_satisfies_what_asks_for_nothing_learnt(put: Put, asserted: Any, satisfied: bool) -> None:
-    assert put(asserted) == (("still",) if satisfied else ())
+def test_an_agent_satisfies_what_asks_for_nothing_learnt(put: Put, asserted: Any, answer: bool | str) -> None:
+    report = put(asserted)
+    assert report.satisfied_by == (("still",) if answer is True else ())
+    assert report.unasked == ((("still", answer),) if isinstance(answer, str) else ())
 
 
 def test_an_agent_everywhere_is_never_put_beside_trials(put: Put) -> None:
     agent = NullAgent("solves nothing", _still, everywhere=True)
-    assert put(lambda trials: trials("better").mean_success > trials("worse").mean_success, full=agent) == ()
-    assert put(_stays, full=agent) == ("full",)
+    assert (
+        put(lambda trials: trials("better").mean_success > trials("worse").mean_success, full=agent).satisfied_by == ()
+    )
+    assert put(_stays, full=agent).satisfied_by == ("full",)
 
 
 def test_controls_are_put_to_no_agent(put: Put) -> None:
-    assert put(_stays, where=CONTROL) == ()
+    report = put(_stays, where=CONTROL)
+    assert report.satisfied_by == report.unasked == ()
 
 
 def test_an_agent_that_is_a_method_is_not_run_for_it(put: Put) -> None:
-    assert put(_stays, chance=NullAgent("the worse one", method="worse")) == ()
+    report = put(_stays, chance=NullAgent("the worse one", method="worse"))
+    assert (report.satisfied_by, report.unasked) == ((), (("chance", "only stored trials are asked for"),))
+    assert "unasked" not in report.to_json()  # records of verdicts stay as they are
 
 
 @pytest.mark.parametrize("fields", [{}, {"method": "worse", "numbers": _still}])

@@ -14,9 +14,11 @@ AGENT = """
 
 from evoclaims.paper.reproduction import NullAgent
 
-REPRODUCTION = replace(
-    REPRODUCTION, null_agents={"zero": NullAgent("no bit right", lambda c: {"metrics": {"furthest_solved": -1.0}})}
-)
+AGENTS = {
+    "zero": NullAgent("no bit right", lambda c: {"metrics": {"furthest_solved": -1.0}}),
+    "absent": NullAgent("a method that is not run", method="nobody"),
+}
+REPRODUCTION = replace(REPRODUCTION, null_agents=AGENTS)
 """
 SENTENCE = '[[sentence]]\nline = 4\nsays = "Networks are small"\nbecause = "small has no number"\n'
 CLAIMS = """
@@ -64,7 +66,7 @@ def test_readings_duplicates_and_chance_are_shown(audit: Evoclaims) -> None:
     lines = out.splitlines()
     assert lines[0].startswith("Of 1 sentence of the paper (B as A counted once), 1 supported in every case. By case")
     assert "Chance alone would support at most 0.1 of 2 tested cases" in lines[0]
-    assert "supported and vacuous (satisfied by one of 1 null agent): none" in lines
+    assert "supported and vacuous (satisfied by one of 2 null agents): none" in lines
     assert "  A (supported): supported as “all”; refuted as “none”" in lines
     (late,) = [line for line in lines if ": written 3000-01-01, first trial 2" in line]
     assert late.startswith("  B (supported)")
@@ -74,10 +76,18 @@ def test_readings_duplicates_and_chance_are_shown(audit: Evoclaims) -> None:
 def test_a_vacuous_support_ends_with_1(audit: Evoclaims, evoclaims: Evoclaims) -> None:
     status, out, _ = audit(CLAIMS, VACUOUS)
     assert status == 1
-    assert "supported and vacuous (satisfied by one of 1 null agent): 1\n  V: zero\n" in out
+    assert "supported and vacuous (satisfied by one of 2 null agents): 1\n  V: zero\n" in out
     table = evoclaims("status", "--tier=full")[1]
     assert "✓ supported, vacuous" in table
     assert "claims (full): 2 supported, 1 supported but vacuous" in table
+
+
+def test_agents_that_were_not_put_to_an_assertion_are_named_with_the_reason(audit: Evoclaims) -> None:
+    assert (
+        "null agents that could not be put to an assertion: 2\n"
+        "  absent (it is not run on the task): A, B, V\n"
+        "  zero (there is no 'success'): A, B\n"
+    ) in audit(CLAIMS, VACUOUS)[1]
 
 
 def test_a_claim_without_line_and_date_ends_with_1(audit: Evoclaims) -> None:
@@ -105,5 +115,4 @@ def test_the_page_of_a_claim_shows_its_readings_and_null_agents(audit: Evoclaims
     assert evoclaims("report", "--tier=full")[0] == 0
     text = unpacked.read(Path("report/index.html"))
     assert "depends on the reading: supported as “all”; refuted as “none”" in text
-    assert text.count("No null agent satisfies this assertion (zero).") == 2
-    assert "Null agents that satisfy this assertion: zero" in text
+    assert "Null agents that satisfy this assertion: zero (no bit right). Not put to it: absent (it is not run" in text

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import pytest
 
 from evoclaims.claims.fetching import StoredOnly
-from evoclaims.claims.null_agents import satisfied_by
+from evoclaims.claims.null_agents import answers
 from evoclaims.envs import SimpleAlu
 from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.design import Look
@@ -80,7 +80,8 @@ def satisfied(tmp_path_factory: pytest.TempPathFactory) -> Any:
 
     def put(asserted: Any) -> tuple[str, ...]:
         assertion: Assertion = asserted(group)
-        return satisfied_by(NULL_AGENTS, assertion, Look(10, 0.05), FULL.design, fetch_from, group)
+        found = answers(NULL_AGENTS, assertion, Look(10, 0.05), FULL.design, fetch_from, group)
+        return tuple(name for name, answer in found.items() if answer is True)
 
     return put
 

@@ -13,6 +13,9 @@ import unpacked
 from tiny_project import Project
 
 from evoclaims import cli
+from evoclaims.cli.project import open_project
+from evoclaims.figures.figure import Scope
+from evoclaims.figures.trial_numbers import read
 from evoclaims.trials.store import Store
 
 PAPER = """
@@ -118,6 +121,7 @@ def test_a_new_history_names_the_edited_table(ours: Project) -> None:
     shown = ours.run(own_store=True).stdout.str()
     assert "a (smoke): a new history begins, " in shown
     assert "of theirs on parity, imported.sha256 " in shown
+    assert "imported.where" not in shown  # rows of the same algorithm are compared
 
 
 @pytest.mark.parametrize(
@@ -135,6 +139,42 @@ def test_too_few_trials_are_inconclusive_and_say_how_many_it_needs(
     outcome, reason = _judged(ours, f"-m{tier}")
     assert outcome == "inconclusive"
     assert reason.startswith(said)
+
+
+def test_imported_trials_count_from_0_whatever_the_first_seed_of_the_design(
+    ours: Project, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Beside trials that are run, which have the design's seeds."""
+    paper = (ours.path / "our_paper.py").read_text()
+    (ours.path / "our_paper.py").write_text(
+        paper.replace("Design.fixed(10)", "Design((Look(10, 0.05),), first_seed=100)")
+        .replace("import tiny_paper", "import tiny_paper\nfrom evoclaims import NullAgent")
+        .replace(
+            "Path(__file__).parent,",
+            "Path(__file__).parent, null_agents={'right': NullAgent('x', method='right')}, tiers=",
+        )
+    )
+    ours.write(a=BETTER, b="verdict(trials('right', on='parity').mean_success > 0.9)")
+    assert "claims: 2 supported\n" in ours.run(own_store=True).stdout.str()
+    opened = open_project(".evoclaims")
+    scope = Scope(opened.archive, opened.reproduction, "smoke")
+    drawn = {
+        method: read(scope, method, "parity", lambda trials: trials.mean_success) for method in ("right", "theirs")
+    }
+    assert [number.seed for number in drawn["right"].each] == list(range(100, 110))
+    assert [number.seed for number in drawn["theirs"].each] == list(range(10))
+    assert all(len(of.values) == 10 for of in drawn.values())
+    assert cli.main(["reference"]) == 0
+    assert capsys.readouterr().out.count(": 10 trials") == 3
+    cli.main(["audit", "--tier=smoke"])
+    assert (
+        "\n  right (too many trials are copies of each other): a\n" in capsys.readouterr().out
+    )  # those of its own seeds
+    assert cli.main(["accept", "--tier=smoke"]) == 1  # something was written
+    (ours.path / "runs.csv").write_text(_table(_numbers(0.9), _numbers(0.3)))
+    del sys.modules["our_paper"]  # which has read the old one
+    edited = ours.run(own_store=True).stdout.str()
+    assert "supported under the old rules: of theirs on parity, imported.sha256 " in edited
 
 
 def test_plan_says_beforehand_that_a_table_is_too_short(ours: Project, capsys: pytest.CaptureFixture[str]) -> None:
@@ -178,6 +218,41 @@ def test_a_measure_that_the_table_lacks_is_an_error_with_those_that_it_has(ours:
     outcome, reason = _judged(ours)
     assert outcome == "error"
     assert said in reason
+
+
+@pytest.mark.parametrize(
+    ("asserted", "said"),
+    [
+        (
+            "event('e', lambda t: t.metrics['mean_success'] > 0.801).in_every_trial()",
+            "seeds 0 (10 in the table), 1 (13 in",
+        ),
+        ("event('e', lambda t: 1).stays()", "in the trial of seed 0 (10 in the table), neither True nor"),
+        (
+            "measure('x', lambda t: float('nan')).between(0, 1)",
+            "NaN in the finished trial of seed 0 (10 in the table) (id ",
+        ),
+    ],
+)
+def test_a_reason_names_a_trial_by_its_seed_in_the_table_too(ours: Project, asserted: str, said: str) -> None:
+    ours.write(a=f"verdict(trials('theirs', on='parity').{asserted})")
+    assert said in _judged(ours)[1]
+
+
+def test_the_page_names_a_trial_by_its_seed_in_the_table_too(ours: Project) -> None:
+    rows = [
+        f"{algo},{seed},{step},{'nan' if seed == step == 12 else 0.01 * step + seed / 1000}\n"
+        for algo in ("good", "bad")
+        for seed in range(10, 20)
+        for step in (11, 12)
+    ]
+    (ours.path / "runs.csv").write_text("algo,seed,at,success\n" + "".join(rows))
+    paper = (ours.path / "our_paper.py").read_text()
+    (ours.path / "our_paper.py").write_text(paper.replace('by="Ada"', 'by="Ada", step="at"'))
+    assert cli.main(["report", "--tier=smoke"]) == 0
+    page = unpacked.read(ours.path / "report" / "index.html")
+    assert "2 of 20 trials diverged and count as the worst result (seeds 2 (12 in the table))." in page
+    assert "seed 0 (10 in the table)" in page  # a line of the training curves
 
 
 def test_a_metric_is_measured_by_its_name(ours: Project) -> None:
@@ -231,8 +306,8 @@ def test_a_table_without_some_of_the_reference_trials_is_told_even_if_no_test_fi
     edited = judged(whole.replace("good,10,0.800\n", "").replace("good,16,0.802\n", "").replace("0.804", "0.814"))
     assert "reference trials: 2 comparisons, 0 drifted" in edited
     assert (
-        "EDITED theirs on parity (smoke), another table: reference trials that are judged no longer: seeds 10, 16 of "
-        "the table; with other numbers: seeds 22 of the table\n"
+        "EDITED theirs on parity (smoke), another table: reference trials that are judged no longer: seeds 10, 16 in "
+        "the table; with other numbers: seeds 22 in the table\n"
     ) in edited
     assert "EDITED" not in judged(whole + "good,1000,0.1\n")
 

@@ -26,8 +26,8 @@ from evoclaims.verdicts.upgrade import Succession, Upgrade, predecessors, upgrad
 MOST: Final = 10_000
 """Most combinations of stored conditions that are tried for one claim."""
 
-NAMES: Final = (("method", "name"), ("task", "name"), ("imported", "file"))
-"""Where a specification has the names that an edit seldom changes together."""
+NAMES: Final = (("method", "name"), ("task", "name"), ("imported", "file"), ("imported", "where"))
+"""Where a specification has what an edit seldom changes together: names, or which rows of a table are read."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ def upgraded(session: Session, reports: Sequence[ClaimReport]) -> Upgrade:
         here = condition.versions
         now = tuple(trial for trial in trials if agree(trial.provenance, here))
         design = session.reproduction.tier(used.tier).design
-        seeds = {*design.seeds(design.last.n), *(trial.seed for trial in now)}
+        seeds = {*design.seeds(design.last.n, bool(condition.existing)), *(trial.seed for trial in now)}
         others = (session.store.others(TrialSpec(condition, seed).id, here) for seed in seeds)
         before = predecessors([record for several in others for record in several], condition.packages)
         if now and before and len(now) == len(trials):
@@ -170,8 +170,11 @@ def _new_history(session: Session, report: ClaimReport, old: AcceptedVerdict, st
     now = {source.label: tier.condition(source.method, source.task) for source in report.sources}
     folder = session.reproduction.references_of(session.variant)
     own = [references.committed(folder, report.tier, source.method, source.task) for source in report.sources]
-    groups = [_by_condition([*stored, *trials], set(tier.design.seeds(old.n))) for trials in own]
-    for alike in (2, 1):  # names of method and task that stayed: an edit seldom changes both
+    groups = [
+        _by_condition([*stored, *trials], set(tier.design.seeds(old.n, bool(condition.existing))))
+        for trials, condition in zip(own, now.values(), strict=True)
+    ]
+    for alike in (2, 1):  # names that stayed: an edit seldom changes both
         sides = [
             [trials for trials in of_source if _alike(trials[0].spec, condition.plain) >= alike]
             for of_source, condition in zip(groups, now.values(), strict=True)
@@ -193,7 +196,7 @@ def _by_condition(trials: Sequence[TrialResult], seeds: set[int]) -> list[list[T
 
 
 def _alike(old: Mapping[str, Any], new: Mapping[str, Any]) -> int:
-    """Return how many names of two conditions are the same: of the method and the task, or of the imported table."""
+    """Return how many of `NAMES` two conditions have in common: of method and task, or of an imported table."""
     names = [[(spec.get(part) or {}).get(name) for part, name in NAMES] for spec in (old, new)]
     return sum(one == other for one, other in zip(*names, strict=True) if one is not None)
 

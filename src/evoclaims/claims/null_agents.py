@@ -7,7 +7,7 @@ trials, and not to A's against the agent, which A should beat.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 
 from evoclaims.claims.as_published import PARTS, record
@@ -27,16 +27,19 @@ from evoclaims.trials.spec import TrialSpec
 OtherTrials = Callable[[str, str], TrialGroup]
 """Returns the trials of a method on a task."""
 
+Answer = bool | str
+"""Whether an agent satisfies an assertion; a clause that says why it could not be asked."""
 
-def satisfied_by(
+
+def answers(
     agents: Mapping[str, NullAgent],
     assertion: Assertion,
     look: Look,
     design: Design,
     trials: Fetch,
     others: OtherTrials | None,
-) -> tuple[str, ...]:
-    """Return the names of the null agents whose trials support an assertion at one look.
+) -> dict[str, Answer]:
+    """Return by name whether the trials of null agents support an assertion at one look, or why that is not known.
 
     Args:
         agents: by name.
@@ -47,7 +50,7 @@ def satisfied_by(
         others: trials of agents that are methods; None leaves these agents out.
     """
     once = replace(design, looks=(look,))
-    return tuple(name for name, agent in agents.items() if _satisfies(agent, assertion, once, trials, others))
+    return {name: _answer(agent, assertion, once, trials, others) for name, agent in agents.items()}
 
 
 def claimed(assertion: Assertion) -> frozenset[str]:
@@ -64,51 +67,60 @@ def claimed(assertion: Assertion) -> frozenset[str]:
     return frozenset(found)
 
 
-def _satisfies(
+def _answer(
     agent: NullAgent, assertion: Assertion, design: Design, trials: Fetch, others: OtherTrials | None
-) -> bool:
+) -> Answer:
+    """Return an agent's answer in any of its places; it was asked if it could be in one of them."""
     if agent.method and others is None:
-        return False
+        return "only stored trials are asked for"
     every = frozenset(source.fingerprint for source in assertion.sources())
-    places = {every} if agent.everywhere else {every, claimed(assertion)}
-    return any(_supported(agent, place, assertion, design, trials, others) for place in places)
+    places = [every] if agent.everywhere else [every, claimed(assertion)]
+    found = [_supported(agent, place, assertion, design, trials, others) for place in places]
+    return True in found or (False not in found and found[0])
 
 
 def _supported(
     agent: NullAgent,
-    place: Iterable[str],
+    place: Collection[str],
     assertion: Assertion,
     design: Design,
     trials: Fetch,
     others: OtherTrials | None,
-) -> bool:
-    """Whether an assertion is supported with an agent in the place of some conditions; False where it cannot be."""
+) -> Answer:
+    """Whether an assertion is supported with an agent in the place of some conditions, or why it cannot be there."""
 
     def fetch(source: Source, seeds: tuple[int, ...]) -> tuple[TrialResult, ...]:
-        return _trials(agent, source, seeds, trials, others) if source.fingerprint in place else trials(source, seeds)
+        if source.fingerprint not in place:
+            return trials(source, seeds)
+        if others is not None and agent.method and isinstance(source, TrialGroup):
+            other = others(agent.method, source.task)
+            return trials(other, design.seeds(len(seeds), bool(other.condition.existing)))
+        return _trials(agent, source, seeds)
 
     try:
         ending = decide(assertion, design, fetch)
-    except (NotStoredError, UnknownNameError):
-        return False
-    return ending is not None and ending.outcome is Outcome.SUPPORTED
+    except NotStoredError as error:
+        return str(error)
+    except UnknownNameError:
+        return "it is not run on the task"
+    if ending is None:
+        return "there are too few trials"
+    if ending.outcome is Outcome.ERROR:  # "There is no 'reward' in the finished trial of ...", say
+        lacking = ending.note.partition(" in the finished trial")[0]
+        return f"{lacking[:1].lower()}{lacking[1:]}"
+    if ending.finding is None:
+        return "too many trials are copies of each other"
+    return ending.outcome is Outcome.SUPPORTED
 
 
-def _trials(
-    agent: NullAgent, source: Source, seeds: Sequence[int], trials: Fetch, others: OtherTrials | None
-) -> tuple[TrialResult, ...]:
-    """Return an agent's trials in the place of a condition's.
+def _trials(agent: NullAgent, source: Source, seeds: Sequence[int]) -> tuple[TrialResult, ...]:
+    """Return trials with an agent's own numbers in the place of a condition's.
 
     Raises:
         NotStoredError: when it has none.
-        UnknownNameError: when its method is not run on the task.
     """
-    if not isinstance(source, TrialGroup):
-        raise NotStoredError(f"{agent.says} cannot stand for {source.label}")
-    if others is not None and agent.method:
-        return trials(others(agent.method, source.task), tuple(seeds))
-    numbers = agent.numbers(source.condition) if agent.numbers is not None else None
-    if numbers is None:
-        raise NotStoredError(f"{agent.says} cannot stand for {source.label}")
+    numbers = agent.numbers(source.condition) if agent.numbers and isinstance(source, TrialGroup) else None
+    if not isinstance(source, TrialGroup) or numbers is None:
+        raise NotStoredError("it cannot stand for the conditions")
     whole = {part: dict(numbers.get(part, {})) for part in PARTS}
     return tuple(record(TrialSpec(source.condition, seed), whole) for seed in seeds)

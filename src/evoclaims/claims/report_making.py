@@ -147,7 +147,6 @@ def _report(
     again: Mapping[str, Collection[int]],
 ) -> ClaimReport:
     groups = [source for source in assertion.sources() if isinstance(source, TrialGroup)]
-    seeds = design.seeds(verdict.n)
     return replace(
         unjudged(test, verdict.outcome, verdict.reason),
         verdict=verdict,
@@ -155,6 +154,7 @@ def _report(
         sources=tuple(
             _source(group, trials(group, seeds) if seeds else (), again.get(group.fingerprint, ()), assertion, seeds)
             for group in groups
+            for seeds in [design.seeds(verdict.n, bool(group.condition.existing))]
         ),
         attainable=tuple(
             Attainable(look.n, look.alpha, p.supported, p.refuted, p.smaller)

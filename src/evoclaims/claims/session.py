@@ -11,7 +11,7 @@ import pytest
 from evoclaims.claims.as_published import AsPublished
 from evoclaims.claims.claim import ClaimTest, Expectation
 from evoclaims.claims.fetching import RunMissing, StoredOnly
-from evoclaims.claims.null_agents import satisfied_by
+from evoclaims.claims.null_agents import answers
 from evoclaims.claims.report_making import (
     Reading,
     chance_of_inconclusive,
@@ -113,7 +113,7 @@ class Session:
         if self.leaves(test.tier, assertion):
             return without_trials(test, assertion, design, f"the variant {self.variant} changes none of its trials")
         report = report_of(test, assertion, design, self.trials_of, self.again)
-        report = replace(report, satisfied_by=self._satisfied_by(report, assertion, design))
+        report = self._with_null_agents(report, assertion, design)
         if self.variant:
             return report
         report = replace(crash_shown_by(report, assertion), chance=self._chance(report, assertion, design))
@@ -123,14 +123,14 @@ class Session:
         own = read_as(first, design, self.trials_of, report.outcome)
         return replace(report, readings=(own, *(read_as(one, design, self.trials_of) for one in others)))
 
-    def _satisfied_by(self, report: ClaimReport, assertion: Assertion, design: Design) -> tuple[str, ...]:
-        """Return the null agents that satisfy a claim of the paper; controls and mechanisms are left out.
+    def _with_null_agents(self, report: ClaimReport, assertion: Assertion, design: Design) -> ClaimReport:
+        """Add the null agents that satisfy a claim of the paper; controls and mechanisms are put to none.
 
         Only trials that were looked at are asked for again, so that nothing runs for it.
         """
         agents = self.reproduction.null_agents
         if not agents or not report.n or report.is_control or isinstance(self.fetch, AsPublished):
-            return ()
+            return report
         look = Look(report.n, design.alpha)
         if self.only_reads and assertion.attainable(look.n, design).supported > look.alpha:
             look = Look(design.last.n, design.alpha)
@@ -138,7 +138,12 @@ class Session:
         def others(method: str, task: str) -> TrialGroup:
             return self.group(method, task, report.tier)
 
-        return satisfied_by(agents, assertion, look, design, self.trials_of, others if self.only_reads else None)
+        found = answers(agents, assertion, look, design, self.trials_of, others if self.only_reads else None)
+        return replace(
+            report,
+            satisfied_by=tuple(name for name, answer in found.items() if answer is True),
+            unasked=tuple((name, answer) for name, answer in found.items() if isinstance(answer, str)),
+        )
 
     def _chance(self, report: ClaimReport, assertion: Assertion, design: Design) -> float | None:
         """Return how often an inconclusive claim ends so in draws from its pilots, if it was accepted as supported."""

@@ -52,7 +52,7 @@ def main(options: argparse.Namespace) -> int:
             under = " and ".join(name or "the protocol itself" for name in places)
             print(f"left alone: {method} on {task}: the same condition as under {under}, committed there")
             continue
-        seeds = range(tier.design.first_seed, tier.design.first_seed + sizes[-1])
+        seeds = tier.design.seeds(sizes[-1], bool(condition.existing))
         path = references.path_of(reproduction.references_of(options.variant), options.tier, method, task)
         there = references.load(path)
         committed = [trial for trial in there if trial.condition == condition.id]

@@ -98,11 +98,12 @@ def main(options: argparse.Namespace) -> int:
 
 def _tried(project: Project, tier: str) -> list[str]:
     reproduction = project.reproduction
-    seeds = reproduction.tier(tier).design.seeds(1)
+    design = reproduction.tier(tier).design
     return [
         name
         for name in reproduction.variants
         if any(
-            project.archive.trials(condition, seeds)[0] for condition in reproduction.changed_by(name, tier).values()
+            project.archive.trials(condition, design.seeds(1, bool(condition.existing)))[0]
+            for condition in reproduction.changed_by(name, tier).values()
         )
     ]

@@ -105,9 +105,10 @@ def read(scope: Scope, method: str, task: str, measure_of: MeasureOf) -> TrialNu
     """Read a measure from every trial that the scope's tier looks at."""
     group = scope.group(method, task)
     measure = measure_of(group)
-    trials = scope.archive.trials(group.condition, scope.seeds)
-    ids = [TrialSpec(group.condition, seed).id for seed in scope.seeds]
-    each = [_number(measure, *found) for found in zip(scope.seeds, ids, trials, strict=True)]
+    seeds = scope.tier.design.seeds(len(scope.seeds), bool(group.condition.existing))
+    trials = scope.archive.trials(group.condition, seeds)
+    ids = [TrialSpec(group.condition, seed).id for seed in seeds]
+    each = [_number(measure, *found) for found in zip(seeds, ids, trials, strict=True)]
     return TrialNumbers(method, task, measure.name, tuple(each))
 
 

@@ -116,7 +116,7 @@ class Design:
         p0: the probability of success that "solves" and "stays" must exceed.
         a12_margin: the size that a comparison claims, as Vargha and Delaney's A12: what the paper's own design detects
             with power 1/3 (see `for_paper`).
-        first_seed: trials use the seeds first_seed, first_seed + 1, ...
+        first_seed: trials that are run use the seeds first_seed, first_seed + 1, ...; imported ones count from 0.
     """
 
     looks: tuple[Look, ...]
@@ -150,9 +150,10 @@ class Design:
         """The last look, which takes the most trials."""
         return self.looks[-1]
 
-    def seeds(self, n: int) -> tuple[int, ...]:
-        """Return the seeds of the first `n` trials."""
-        return tuple(range(self.first_seed, self.first_seed + n))
+    def seeds(self, n: int, imported: bool = False) -> tuple[int, ...]:
+        """Return the seeds of the first `n` trials of a condition that is run, or of one that is imported."""
+        first = 0 if imported else self.first_seed
+        return tuple(range(first, first + n))
 
     def for_paper(self, trials: int) -> Design:
         """Return the design with the margin for a paper that compares `trials` trials per side (Simonsohn 2015).

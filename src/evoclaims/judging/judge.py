@@ -141,10 +141,11 @@ def decide(assertion: Assertion, design: Design, fetch: Fetch = fetch_from) -> E
     for index, look in enumerate(looks):
         if not _decidable(assertion.attainable(look.n, design), look.alpha):
             continue
-        if short := _shortage(assertion, look, design):
+        if short := _shortage(assertion, look):
             ending = ending and replace(ending, note=f"{ending.note}{short}; ")
             break
-        trials = {source.fingerprint: fetch(source, design.seeds(look.n)) for source in assertion.sources()}
+        sources = assertion.sources()
+        trials = {one.fingerprint: fetch(one, design.seeds(look.n, one.existing < math.inf)) for one in sources}
         crashed = _crashed(assertion, trials)
         if crashed:
             return Ending(Outcome.ERROR, look, trials, None, crashed)
@@ -226,12 +227,12 @@ def _decidable(attainable: PValues, alpha: float) -> bool:
     return min(attainable.supported, attainable.size) <= alpha
 
 
-def _shortage(assertion: Assertion, look: Look, design: Design) -> str:
+def _shortage(assertion: Assertion, look: Look) -> str:
     """Say which source has too few trials for a look, which is then not taken; empty if none has."""
     for source in assertion.sources():
-        if design.seeds(look.n)[-1] >= source.existing:
+        if look.n > source.existing:
             few = f"there are {source.existing}" if source.existing > 1 else "there is 1"
-            return f"underpowered: needs n = {design.seeds(look.n)[-1] + 1} trials of {source.label}, and {few}"
+            return f"underpowered: needs n = {look.n} trials of {source.label}, and {few}"
     return ""
 
 
@@ -381,7 +382,7 @@ def _underpowered(assertion: Assertion, design: Design, mark: str) -> Verdict:
     """Return the verdict of a design in which no look can decide."""
     look, attainable = attainability(assertion, design)[-1]
     decidable = (one for one in assertion.looks(design) if _decidable(assertion.attainable(one.n, design), one.alpha))
-    short = "".join(_shortage(assertion, one, design) for one in list(decidable)[:1])
+    short = "".join(_shortage(assertion, one) for one in list(decidable)[:1])
     return Verdict(
         outcome=Outcome.INCONCLUSIVE,
         reason=short or f"underpowered: {_needs(assertion, design)}",

@@ -206,7 +206,7 @@ class EventReading(ScalarReading):
         held: object = self.holds(checked(trial))
         if not isinstance(held, bool | np.bool_):
             raise UnreadableTrialError(
-                f"{self.describe()!r} is {held!r} in the trial of seed {trial.seed}, neither True nor "
+                f"{self.describe()!r} is {held!r} in the trial of seed {trial.seed_in_words}, neither True nor "
                 "False. Let the event's function return a comparison, such as lambda t: "
                 "t.metrics['steps'] > 5."
             )

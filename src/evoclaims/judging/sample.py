@@ -165,7 +165,9 @@ def ranked(value: float, trial: TrialResult, what: str) -> float:
         UnreadableTrialError: when it is NaN.
     """
     if math.isnan(value):
-        raise UnreadableTrialError(f"{what} is NaN in the finished trial of seed {trial.seed} (id {trial.id[:12]}).")
+        raise UnreadableTrialError(
+            f"{what} is NaN in the finished trial of seed {trial.seed_in_words} (id {trial.id[:12]})."
+        )
     return value
 
 

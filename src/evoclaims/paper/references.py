@@ -248,7 +248,7 @@ def _edited(new: Sequence[TrialResult], earlier: Sequence[TrialResult]) -> str:
         "reference trials that are judged no longer": [seed for seed in before if seed not in now],
         "with other numbers": [seed for seed, was in before.items() if now.get(seed, was) != was],
     }
-    return "; ".join(f"{what}: seeds {', '.join(seeds)} of the table" for what, seeds in found.items() if seeds)
+    return "; ".join(f"{what}: seeds {', '.join(seeds)} in the table" for what, seeds in found.items() if seeds)
 
 
 def _read_alike(one: TrialResult, other: TrialResult) -> bool:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from evoclaims.paper.reported import Uncovered
 from evoclaims.paper.reproduction import NullAgent
 from evoclaims.report import replication_cells, table_cells
-from evoclaims.report.formatting import plural
+from evoclaims.report.formatting import listed, plural
 from evoclaims.report.verdict_overview import tally
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.readings import by_reading
@@ -19,9 +19,13 @@ def nulls(report: ClaimReport, agents: Mapping[str, NullAgent]) -> str:
     if not agents or not report.n or report.is_control:
         return ""
     found = [f"{name} ({agents[name].says})" for name in report.satisfied_by if name in agents]
-    if found:
-        return f"Null agents that satisfy this assertion: {', '.join(found)}."
-    return f"No null agent satisfies this assertion ({', '.join(agents)})."
+    asked = [name for name in agents if name not in dict(report.unasked)]
+    says = [f"Null agents that satisfy this assertion: {', '.join(found)}."] if found else []
+    if asked and not found:
+        says.append(f"No null agent satisfies this assertion ({', '.join(asked)}).")
+    if report.unasked:
+        says.append(f"Not put to it: {', '.join(f'{name} ({reason})' for name, reason in report.unasked)}.")
+    return " ".join(says)
 
 
 def lines(
@@ -67,6 +71,14 @@ def _kinds(ours: Sequence[ClaimReport], papers: Sequence[ClaimReport], agents: i
     yield (
         "satisfied by a null agent, but not vacuous (not supported, or a planted fault changes the verdict)",
         [f"{names} ({report.outcome})" for report, names in satisfied if not report.is_vacuous],
+    )
+    unasked: dict[str, list[str]] = {}
+    for report in ours:
+        for agent, reason in report.unasked:
+            unasked.setdefault(f"{agent} ({reason})", []).append(report.name)
+    yield (
+        "null agents that could not be put to an assertion",
+        [f"{agent}: {listed(names)}" for agent, names in sorted(unasked.items())],
     )
     yield (
         "verdicts that depend on the reading",

@@ -193,11 +193,11 @@ def _broken(trials: Sequence[TrialSummary]) -> tuple[str, ...]:
     found = []
     for status, ended in ENDINGS.items():
         if failed := [trial for trial in trials if trial.status == status]:
-            seeds = listed(sorted({trial.seed for trial in failed}))
+            seeds = listed(dict.fromkeys(trial.seed_in_words for trial in sorted(failed, key=lambda one: one.seed)))
             found.append(f"{len(failed)} of {plural(len(trials), 'trial')} {ended} (seeds {seeds}).")
     without = [t for t in trials if t.status == "done" and t.score is not None and math.isnan(t.score)]
     if without:
-        found.append(f"The mean success of finished trials is NaN (seeds {listed(t.seed for t in without)}).")
+        found.append(f"The mean success of finished trials is NaN (seeds {listed(t.seed_in_words for t in without)}).")
     return tuple(found)
 
 

@@ -81,7 +81,7 @@ def _constant(trials: Sequence[TrialSummary], name: str) -> float | None:
 
 def _panel(trials: Sequence[TrialSummary], name: str) -> CurvePanel:
     broken = sum(not np.isfinite(trial.curves[name]).all() for trial in trials)
-    lines = tuple(Line(f"seed {t.seed}", t.curves[AXES[0]], t.curves[name]) for t in trials)
+    lines = tuple(Line(f"seed {t.seed_in_words}", t.curves[AXES[0]], t.curves[name]) for t in trials)
     return CurvePanel(clean(name), lines, broken)
 
 

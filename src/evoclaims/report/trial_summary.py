@@ -114,7 +114,7 @@ class TrialSummary:
 
     Attributes:
         trial: its id.
-        seed, status: as in its record.
+        seed, seed_in_words, status: as in its record.
         score: the "mean_success" metric; None without it.
         origin: where it was made.
         reports: how many points its curves have.
@@ -123,6 +123,7 @@ class TrialSummary:
 
     trial: str
     seed: int
+    seed_in_words: str
     status: str
     score: float | None
     origin: Origin
@@ -173,6 +174,7 @@ class Reader:
         return TrialSummary(
             trial=found.id,
             seed=found.seed,
+            seed_in_words=found.seed_in_words,
             status=found.status,
             score=found.metrics.get("mean_success"),
             origin=self._origins.setdefault(origin, origin),

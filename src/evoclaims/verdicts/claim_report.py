@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Any, Final
@@ -103,6 +103,7 @@ class ClaimReport:
         asserts: hash of the assertion alone, which two claims with one assertion share; empty where none was judged.
         readings: of the sentence, the judged one first; empty where only that one was judged.
         satisfied_by: names of the null agents that satisfy the assertion.
+        unasked: null agents that could not be put to the assertion, each with the reason; no file has them.
         earlier: how its test ended before a plugin ran it again, oldest first; the last run counts.
         chance: of a claim that is inconclusive and was accepted as supported, how often draws from its pilots end so;
             None where that is not known.
@@ -131,6 +132,7 @@ class ClaimReport:
     satisfied_by: tuple[str, ...] = ()
     earlier: tuple[EarlierRun, ...] = ()
     chance: float | None = None
+    unasked: tuple[tuple[str, str], ...] = field(default=(), metadata={"canonical": False})
 
     @property
     def name(self) -> str:

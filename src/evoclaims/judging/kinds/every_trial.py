@@ -52,6 +52,7 @@ class EveryTrial(Assertion):
     def find(self, trials: Trials, design: Design, alpha: float) -> Finding:
         """Check whether it holds."""
         sample = self.event.sample(trials)
-        missed = [seed for seed, value in zip(sample.seeds, sample.values, strict=True) if not value]
-        detail = f"does not hold for seeds {', '.join(map(str, missed))}" if missed else "holds in every trial"
+        pairs = zip(trials[self.event.source.fingerprint], sample.values, strict=True)
+        missed = [trial.seed_in_words for trial, value in pairs if not value]
+        detail = f"does not hold for seeds {', '.join(missed)}" if missed else "holds in every trial"
         return self.fact(not missed, alpha, sample, detail, events=True)
