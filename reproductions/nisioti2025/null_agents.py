@@ -11,8 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from evoclaims import Condition, NullAgent
-from evoclaims.envs import Circuit, DeceptiveMaze, Locomotion, Obstacles, SteppingStones
-from evoclaims.envs.ecorobot.pose import Pose
+from evoclaims.envs import Circuit, DeceptiveMaze, Locomotion, Obstacles, Pose, SteppingStones
 from evoclaims.methods import Neat
 from reproductions.nisioti2025.measures import constant_success
 

@@ -12,10 +12,9 @@ import numpy as np
 from jaxtyping import Array, Float, Int, PRNGKeyArray
 
 from evoclaims.core.errors import require_at_least
-from evoclaims.envs import DeceptiveMaze, Episode, Ruling
+from evoclaims.envs import DeceptiveMaze, Episode, Pose, Ruling
 from evoclaims.envs.base import TaskState
 from evoclaims.envs.ecorobot.deceptive import EASY, Approach
-from evoclaims.envs.ecorobot.pose import Pose
 from evoclaims.envs.ecorobot.robot_task import Outing
 from evoclaims.envs.ecorobot.scene import Scene
 from evoclaims.envs.ecorobot.sensors import Sensor

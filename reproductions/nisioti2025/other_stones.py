@@ -12,8 +12,7 @@ from jaxtyping import Array, Float, Int
 
 from evoclaims.core.errors import require_known
 from evoclaims.core.pytree import pytree
-from evoclaims.envs import STONES, Box, MazePlan, Rangefinders, Ruling, SteppingStones, Surface
-from evoclaims.envs.ecorobot.pose import Pose
+from evoclaims.envs import STONES, Box, MazePlan, Pose, Rangefinders, Ruling, SteppingStones, Surface
 from evoclaims.envs.ecorobot.robot_task import Outing
 from evoclaims.envs.ecorobot.scene import Scene
 from evoclaims.envs.ecorobot.sensors import distances

@@ -12,6 +12,7 @@ from evoclaims.envs.ecorobot.deceptive import DeceptiveMaze as DeceptiveMaze
 from evoclaims.envs.ecorobot.locomotion import Locomotion as Locomotion
 from evoclaims.envs.ecorobot.locomotion import Obstacles as Obstacles
 from evoclaims.envs.ecorobot.maze import MazePlan as MazePlan
+from evoclaims.envs.ecorobot.pose import Pose as Pose
 from evoclaims.envs.ecorobot.robot_task import ROBOT_PACKAGES as ROBOT_PACKAGES
 from evoclaims.envs.ecorobot.robot_task import RobotTask as RobotTask
 from evoclaims.envs.ecorobot.robot_task import Ruling as Ruling
