@@ -32,6 +32,8 @@ def outcomes(monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
     def judge(self: Elsewhere, recipe: Recipe) -> Judged:
         known["asked"] += f"{recipe.version} "
         outcome = known[recipe.version]
+        if outcome == "gone":
+            return Judged(recipe.label, {"other": report("other")}, {})
         if outcome not in ("supported", "refuted", "inconclusive", "error"):
             return Judged(recipe.label, {}, {}, trouble=outcome)
         return Judged(recipe.label, {"a": report("a", outcome)}, {})
@@ -69,6 +71,18 @@ def test_a_release_that_cannot_be_judged_is_gone_round_and_told(
 def test_a_claim_that_breaks_is_searched_for_as_well(evoclaims: Evoclaims, outcomes: dict[str, str]) -> None:
     _from(outcomes, "1.6", "error")
     assert "changed in pebble 1.6; 1.5 was still as 1.0." in evoclaims(*BISECT)[1]
+
+
+def test_a_claim_that_is_gone_has_changed_and_a_release_without_it_alone_says_nothing(
+    evoclaims: Evoclaims, outcomes: dict[str, str]
+) -> None:
+    _from(outcomes, "1.3", "gone")
+    assert "changed in pebble 1.3; 1.2 was still as 1.0." in evoclaims(*BISECT)[1]
+    _from(outcomes, "1.3", "refuted")
+    outcomes["1.2"] = "gone"
+    assert (
+        "not later than 1.3; unknown, since not judged:\n  pebble 1.2: the claim is broken or" in evoclaims(*BISECT)[1]
+    )
 
 
 def test_where_nothing_changed_the_status_says_so(evoclaims: Evoclaims, outcomes: dict[str, str]) -> None:

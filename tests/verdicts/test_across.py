@@ -107,6 +107,27 @@ def test_trials_that_are_the_same_records_are_not_compared(store: Store) -> None
     assert across_report.cell_lines(cell) == ("✓ supported", "the same trials")
 
 
+def test_a_claim_that_only_one_environment_has_is_a_change(store: Store) -> None:
+    """As where its cases are a list of the package."""
+    one, two = _environment(store, "1"), _environment(store, "2")
+    without = replace(two, reports={"plain": two.reports["plain"]}, trials={})
+    gone, new = across([one, without]), across([without, replace(one, label="jax 1")])
+    assert gone.changed == {"jax 2": ["ours"]}
+    assert gone.lines[0] == "jax 2: ours: supported -> not run (there is no such claim in it)"
+    assert across_report.headline(gone) == "jax 2 changes ours."
+    assert [row["outcome"] for row in across_report.rows(gone) if row["claim"] == "ours"] == ["supported", "not run"]
+    assert new.changed == {"jax 1": ["ours"]}
+    assert across_report.cell_lines(new.cells["ours", "jax 1"]) == ("✓ supported, CHANGED", "–")
+
+
+def test_trials_that_the_first_environment_lacks_are_not_called_the_same(store: Store) -> None:
+    first = _environment(store, "1", "error")
+    source = replace(first.reports["ours"].sources[0], trials=())
+    first = judged("jax 1", [replace(first.reports["ours"], sources=(source,))], store)
+    cell = across([first, _environment(store, "2")]).cells["ours", "jax 2"]
+    assert across_report.cell_lines(cell) == ("✓ supported, CHANGED", "–")
+
+
 def test_the_first_environment_is_the_first_that_has_verdicts(store: Store) -> None:
     broken = Judged("jax 0", {}, {}, trouble="no such release")
     found = across([broken, _environment(store, "3"), _environment(store, "1")])
