@@ -12,7 +12,7 @@ import unpacked
 from hand_made_verdicts import report
 from tiny_project import Evoclaims, Project
 
-from evoclaims.cli.elsewhere import Elsewhere
+from evoclaims.cli.elsewhere import Elsewhere, NotJudgedError
 from evoclaims.core.environments import Environment, Recipe, installed_here
 from evoclaims.trials.store import Store
 from evoclaims.verdicts.across import Judged
@@ -221,6 +221,20 @@ def test_no_claim_is_left_out_elsewhere_whatever_the_environment_says_of_pytest(
     monkeypatch.setattr(Environment, "python", Path(sys.executable))
     elsewhere = Elsewhere(project.path, project.path / "claims", stored, "smoke", None, "cpu")
     assert [one.outcome for one in elsewhere._run(Environment(project.path, {}), stored)] == ["refuted", "supported"]
+
+
+def test_trials_of_other_versions_are_not_judged_in_place_of_an_environments_own(
+    project: Project, stored: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever the options of pytest allow: they would look like trials that the release has not changed."""
+    project.write(b="supported")
+    monkeypatch.setenv("PYTEST_ADDOPTS", "--claims-any-version")
+    monkeypatch.setattr(Environment, "python", Path(sys.executable))
+    elsewhere = Elsewhere(project.path, project.path / "claims", stored, "smoke", None, "cpu")
+    here = installed_here()
+    assert elsewhere._run(Environment(project.path, here), stored)
+    with pytest.raises(NotJudgedError, match=f"from trials of numpy {here['numpy']}, which is not what is installed"):
+        elsewhere._run(Environment(project.path, {**here, "numpy": "1.0"}), stored)
 
 
 def test_an_environment_with_what_is_too_old_is_not_judged_and_its_packages_are_named(
