@@ -107,7 +107,7 @@ def test_the_table_is_printed_and_written_and_the_status_says_that_something_cha
     outcomes["1.2"] = "refuted"
     status, out, _ = evoclaims("across", "--package", "pebble", "1.0", "1.1", "1.0", "--as", "markdown")
     assert (status, outcomes["asked"]) == (0, "1.0 1.1 ")
-    assert "No verdict changed and no trial drifted in 1 environment after the first." in out
+    assert "No verdict changed and no drift was shown in 1 environment after the first." in out
     assert "No trial of these claims depends on pebble" in out
     assert Path("report/across.md").read_text().startswith("# No verdict changed")
     status, out, _ = evoclaims("across", "--package", "pebble", "1.0", "1.2", "--as", "csv", "--out", "t.csv")

@@ -75,7 +75,7 @@ def headline(found: Across) -> str:
     compared = len(found.environments) - 1
     if not compared:
         return "There is one environment alone, so that nothing is compared."
-    return f"No verdict changed and no trial drifted in {plural(compared, 'environment')} after the first."
+    return f"No verdict changed and no drift was shown in {plural(compared, 'environment')} after the first."
 
 
 def rows(found: Across) -> list[Row]:
