@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from importlib.metadata import version
+from importlib.metadata import PathDistribution, version
 from pathlib import Path
 
 import pytest
@@ -248,6 +248,26 @@ def test_an_environment_with_what_is_too_old_is_not_judged_and_its_packages_are_
     assert (
         "pebble 1.0: it has jax 0.6.2 (oldest supported: 0.10.2); name a release that works with supported ones" in out
     )
+
+
+def test_what_was_installed_from_a_folder_is_not_called_a_release(
+    evoclaims: Evoclaims, commands: list[list[str]], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """An installer is content with a version that it finds here, such as that of a maintainer's own checkout."""
+    for name, address in (("pebble", '{"url": "file:///pebble", "dir_info": {}}'), ("gravel", "")):
+        information = tmp_path / f"{name}-1.1.dist-info"
+        information.mkdir()
+        (information / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.1\n")
+        if address:
+            (information / "direct_url.json").write_text(address)
+    monkeypatch.syspath_prepend(tmp_path)
+    found = [PathDistribution(folder) for folder in tmp_path.glob("*.dist-info")]
+    monkeypatch.setattr("importlib.metadata.distributions", lambda: found)
+    monkeypatch.setattr("evoclaims.cli.elsewhere.make", lambda *_: Environment(tmp_path / "made", installed_here()))
+    said = "it is what is installed here from file:///pebble, no release: an edit without a new version is not seen"
+    out = [evoclaims("across", "--package", name, "1.0", "1.1")[1] for name in ("pebble", "gravel")]
+    assert f"\npebble 1.1: {said}\n" in out[0]
+    assert [text.count("no release") for text in out] == [2, 0]  # while it is made, and below the table
 
 
 def test_a_run_that_a_signal_kills_is_said_so_with_the_function(

@@ -21,7 +21,7 @@ from evoclaims.claims.claim_names import selected
 from evoclaims.cli.project import open_project
 from evoclaims.cli.store_folder import open_store
 from evoclaims.cli.terminal import terminal
-from evoclaims.core.environments import PIP, Environment, NotInstallableError, Recipe, ending, make, reason
+from evoclaims.core.environments import PIP, Environment, NotInstallableError, Recipe, ending, folder_of, make, reason
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.files import at_once, read_json
 from evoclaims.core.printable import printable
@@ -76,6 +76,9 @@ class Elsewhere:
             moved = environment.moved(recipe.package) if recipe.is_layer else {}
             also = ", ".join(f"{name} {was or 'none'} -> {now}" for name, (was, now) in moved.items())
             notes = f"its installation changed {also}, too" if also else ""
+            if recipe.is_layer and (folder := folder_of(recipe.package, recipe.version)):
+                notes += f"{notes and '; '}it is what is installed here from {folder}, no release: "
+                notes += "an edit without a new version is not seen"
             if notes:
                 print(f"{label}: {notes}", flush=True)
             if below := environment.below(recipe.package, self.root):
