@@ -149,4 +149,16 @@ def detectable_shift(conditions: Sequence[Columns], alpha: float) -> float:
     sides = {one.wide for one in conditions}
     share = _share_of(max(sides), len(sides))
     z = float(norm.isf(alpha * share / (2 * 3)) + norm.ppf(FOUND))
-    return z / math.hypot(*(one.seen for one in conditions if one.wide is max(sides)))
+    tested = [one for one in conditions if one.wide is max(sides)]
+    return z * _spread_of_sum(tested) / sum(one.seen**2 for one in tested)
+
+
+def _spread_of_sum(conditions: Sequence[Columns]) -> float:
+    """Return the standard deviation of the sum over conditions, which is larger where their trials vary together."""
+    total: dict[tuple[str, int], float] = {}
+    for one in conditions:
+        scores = (one.centred / one.spread).sum(axis=1)
+        scores *= one.seen / max(float(np.linalg.norm(scores)), 1e-12)
+        for trial, score in zip(one.trials, scores.tolist(), strict=True):
+            total[trial] = total.get(trial, 0.0) + score
+    return math.hypot(*total.values())
