@@ -88,7 +88,9 @@ def test_a_claim_that_is_gone_has_changed_and_a_release_without_it_alone_says_no
 def test_where_nothing_changed_the_status_says_so(evoclaims: Evoclaims, outcomes: dict[str, str]) -> None:
     status, out, _ = evoclaims(*BISECT)
     assert (status, outcomes["asked"]) == (1, "1.0 1.8 ")
-    assert "The verdict, the distribution and the bits of a did not change between pebble 1.0 and 1.8." in out
+    nothing = "no trials tested for drift, no trial compared to the bit"
+    assert f"a with pebble 1.8 as with 1.0: the same verdict, {nothing}.\n" in out
+    assert "a with pebble 1.8 as with 1.0: no trial compared to the bit.\n" in evoclaims(*BISECT, "--by=bits")[1]
 
 
 def test_an_end_that_cannot_be_judged_is_an_error(evoclaims: Evoclaims, outcomes: dict[str, str]) -> None:

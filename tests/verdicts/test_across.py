@@ -11,6 +11,7 @@ import pytest
 from hand_made_verdicts import report
 from made_trials import trial_of
 
+from evoclaims.cli.bisect import KINDS, _unchanged
 from evoclaims.core.packages import recorded
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.hand_built import HandBuilt
@@ -126,6 +127,15 @@ def test_trials_that_the_first_environment_lacks_are_not_called_the_same(store: 
     first = judged("jax 1", [replace(first.reports["ours"], sources=(source,))], store)
     cell = across([first, _environment(store, "2")]).cells["ours", "jax 2"]
     assert across_report.cell_lines(cell) == ("✓ supported, CHANGED", "–")
+
+
+def test_what_did_not_change_is_said_as_far_as_it_was_compared(store: Store) -> None:
+    one, two = (replace(_environment(store, version), label=version) for version in "12")
+    only = [replace(each, reports={"ours": each.reports["ours"]}) for each in (one, two, replace(one, label="again"))]
+    said = "the same verdict, no drift shown, 10 trials the same to the bit"
+    assert _unchanged(only[0], only[1], list(KINDS)) == said
+    said = "the same verdict, the same trials, since none depends on it"
+    assert _unchanged(only[0], only[2], list(KINDS)) == said
 
 
 def test_the_first_environment_is_the_first_that_has_verdicts(store: Store) -> None:

@@ -11,6 +11,7 @@ from evoclaims.cli.elsewhere import between, opened, released
 from evoclaims.core.environments import Recipe, checked, checked_name
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.judging.verdict import Outcome
+from evoclaims.report.formatting import plural
 from evoclaims.verdicts.across import Cell, Judged, across
 
 
@@ -80,8 +81,8 @@ def main(options: argparse.Namespace) -> int:
             )
     kinds = [kind for kind in KINDS if options.by in (None, kind) and _differs(tried[0], tried[last], kind)]
     if not kinds:
-        sought = options.by or "verdict, the distribution and the bits"
-        print(f"The {sought} of {options.claim} did not change between {package} {good} and {bad}.")
+        found = _unchanged(tried[0], tried[last], [kind for kind in KINDS if options.by in (None, kind)])
+        print(f"{options.claim} with {package} {bad} as with {good}: {found}.")
         return 1
     kind = kinds[0]
     print(
@@ -102,6 +103,21 @@ def main(options: argparse.Namespace) -> int:
 def _differs(first: Judged, now: Judged, kind: str) -> bool:
     """Whether a claim, or one of its cases, has changed against the first release."""
     return any(KINDS[kind](cell) for (_, label), cell in across([first, now]).cells.items() if label == now.label)
+
+
+def _unchanged(first: Judged, last: Judged, kinds: Collection[str]) -> str:
+    """Return in words what of these kinds is the same at both ends, as far as it could be compared."""
+    cells = [cell for (_, label), cell in across([first, last]).cells.items() if label == last.label]
+    compared = sum(cell.compared for cell in cells)
+    tested = compared or any(cell.drift is not None for cell in cells)  # the same bits need no test
+    found = {
+        "verdict": "the same verdict",
+        "drift": "no drift shown" if tested else "no trials tested for drift",
+        "bits": f"{plural(compared, 'trial')} the same to the bit" if compared else "no trial compared to the bit",
+    }
+    if all(cell.same for cell in cells):
+        found |= dict.fromkeys(("drift", "bits"), "the same trials, since none depends on it")
+    return ", ".join(dict.fromkeys(found[kind] for kind in kinds))
 
 
 def _broken(judged: Judged, claims: Collection[str]) -> set[tuple[str, Outcome]]:

@@ -203,5 +203,5 @@ def _cell(name: str, one: Judged, first: Judged | None, found: Upgrade | None) -
         compared=sum(len(one.pairs) for one in own),
         changed=sum(one.changed for one in own),
         drift=min(rows, key=lambda row: (not row.drifted, row.p_holm, row.p or 1.0), default=None),
-        same=all(first.trials.get(label) == one.trials.get(label) for label in labels),
+        same=bool(labels) and all(first.trials.get(label, ()) == one.trials.get(label) for label in labels),
     )
