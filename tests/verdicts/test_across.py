@@ -121,6 +121,14 @@ def test_a_claim_that_only_one_environment_has_is_a_change(store: Store) -> None
     assert across_report.cell_lines(new.cells["ours", "jax 1"]) == ("✓ supported, CHANGED", "–")
 
 
+def test_trials_of_which_some_cannot_be_compared_are_not_the_same_to_the_bit(store: Store) -> None:
+    first = _environment(store, "1")
+    (trials,) = first.trials.values()
+    first = replace(first, trials=dict.fromkeys(first.trials, trials[:4]))
+    cell = across([first, _environment(store, "2")]).cells["ours", "jax 2"]
+    assert across_report.cell_lines(cell) == ("✓ supported", "0 of 4 differ")
+
+
 def test_trials_that_the_first_environment_lacks_are_not_called_the_same(store: Store) -> None:
     first = _environment(store, "1", "error")
     source = replace(first.reports["ours"].sources[0], trials=())

@@ -53,6 +53,7 @@ class Cell:
         repeated: whether some of its trials were made anew, since they depend on what differs.
         compared: those of them that can be compared to the bit, by seed.
         changed: how many of these differ.
+        whole: whether all can be compared.
         drift: of what the drift check tested, the metric with the smallest p; None if it tested nothing.
         same: whether its trials are those of the first environment, since they depend on nothing that differs.
     """
@@ -63,6 +64,7 @@ class Cell:
     repeated: bool = False
     compared: int = 0
     changed: int = 0
+    whole: bool = False
     drift: DriftRow | None = None
     same: bool = False
 
@@ -202,6 +204,7 @@ def _cell(name: str, one: Judged, first: Judged | None, found: Upgrade | None) -
         repeated=bool(own),
         compared=sum(len(one.pairs) for one in own),
         changed=sum(one.changed for one in own),
+        whole=all(len(one.pairs) == len(one.now) for one in own),
         drift=min(rows, key=lambda row: (not row.drifted, row.p_holm, row.p or 1.0), default=None),
         same=bool(labels) and all(first.trials.get(label, ()) == one.trials.get(label) for label in labels),
     )
