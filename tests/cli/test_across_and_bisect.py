@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from importlib.metadata import version
+from importlib.metadata import PathDistribution, version
 from pathlib import Path
 
 import pytest
@@ -12,7 +12,7 @@ import unpacked
 from hand_made_verdicts import report
 from tiny_project import Evoclaims, Project
 
-from evoclaims.cli.elsewhere import Elsewhere
+from evoclaims.cli.elsewhere import Elsewhere, NotJudgedError
 from evoclaims.core.environments import Environment, Recipe, installed_here
 from evoclaims.trials.store import Store
 from evoclaims.verdicts.across import Judged
@@ -32,6 +32,8 @@ def outcomes(monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
     def judge(self: Elsewhere, recipe: Recipe) -> Judged:
         known["asked"] += f"{recipe.version} "
         outcome = known[recipe.version]
+        if outcome == "gone":
+            return Judged(recipe.label, {"other": report("other")}, {})
         if outcome not in ("supported", "refuted", "inconclusive", "error"):
             return Judged(recipe.label, {}, {}, trouble=outcome)
         return Judged(recipe.label, {"a": report("a", outcome)}, {})
@@ -71,10 +73,24 @@ def test_a_claim_that_breaks_is_searched_for_as_well(evoclaims: Evoclaims, outco
     assert "changed in pebble 1.6; 1.5 was still as 1.0." in evoclaims(*BISECT)[1]
 
 
+def test_a_claim_that_is_gone_has_changed_and_a_release_without_it_alone_says_nothing(
+    evoclaims: Evoclaims, outcomes: dict[str, str]
+) -> None:
+    _from(outcomes, "1.3", "gone")
+    assert "changed in pebble 1.3; 1.2 was still as 1.0." in evoclaims(*BISECT)[1]
+    _from(outcomes, "1.3", "refuted")
+    outcomes["1.2"] = "gone"
+    assert (
+        "not later than 1.3; unknown, since not judged:\n  pebble 1.2: the claim is broken or" in evoclaims(*BISECT)[1]
+    )
+
+
 def test_where_nothing_changed_the_status_says_so(evoclaims: Evoclaims, outcomes: dict[str, str]) -> None:
     status, out, _ = evoclaims(*BISECT)
     assert (status, outcomes["asked"]) == (1, "1.0 1.8 ")
-    assert "The verdict, the distribution and the bits of a did not change between pebble 1.0 and 1.8." in out
+    nothing = "no trials tested for drift, no trial compared to the bit"
+    assert f"a with pebble 1.8 as with 1.0: the same verdict, {nothing}.\n" in out
+    assert "a with pebble 1.8 as with 1.0: no trial compared to the bit.\n" in evoclaims(*BISECT, "--by=bits")[1]
 
 
 def test_an_end_that_cannot_be_judged_is_an_error(evoclaims: Evoclaims, outcomes: dict[str, str]) -> None:
@@ -93,7 +109,7 @@ def test_the_table_is_printed_and_written_and_the_status_says_that_something_cha
     outcomes["1.2"] = "refuted"
     status, out, _ = evoclaims("across", "--package", "pebble", "1.0", "1.1", "1.0", "--as", "markdown")
     assert (status, outcomes["asked"]) == (0, "1.0 1.1 ")
-    assert "No verdict changed and no trial drifted in 1 environment after the first." in out
+    assert "No verdict changed and no drift was shown in 1 environment after the first." in out
     assert "No trial of these claims depends on pebble" in out
     assert Path("report/across.md").read_text().startswith("# No verdict changed")
     status, out, _ = evoclaims("across", "--package", "pebble", "1.0", "1.2", "--as", "csv", "--out", "t.csv")
@@ -209,6 +225,20 @@ def test_no_claim_is_left_out_elsewhere_whatever_the_environment_says_of_pytest(
     assert [one.outcome for one in elsewhere._run(Environment(project.path, {}), stored)] == ["refuted", "supported"]
 
 
+def test_trials_of_other_versions_are_not_judged_in_place_of_an_environments_own(
+    project: Project, stored: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever the options of pytest allow: they would look like trials that the release has not changed."""
+    project.write(b="supported")
+    monkeypatch.setenv("PYTEST_ADDOPTS", "--claims-any-version")
+    monkeypatch.setattr(Environment, "python", Path(sys.executable))
+    elsewhere = Elsewhere(project.path, project.path / "claims", stored, "smoke", None, "cpu")
+    here = installed_here()
+    assert elsewhere._run(Environment(project.path, here), stored)
+    with pytest.raises(NotJudgedError, match=f"from trials of numpy {here['numpy']}, which is not what is installed"):
+        elsewhere._run(Environment(project.path, {**here, "numpy": "1.0"}), stored)
+
+
 def test_an_environment_with_what_is_too_old_is_not_judged_and_its_packages_are_named(
     evoclaims: Evoclaims, commands: list[list[str]], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -220,6 +250,26 @@ def test_an_environment_with_what_is_too_old_is_not_judged_and_its_packages_are_
     assert (
         "pebble 1.0: it has jax 0.6.2 (oldest supported: 0.10.2); name a release that works with supported ones" in out
     )
+
+
+def test_what_was_installed_from_a_folder_is_not_called_a_release(
+    evoclaims: Evoclaims, commands: list[list[str]], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """An installer is content with a version that it finds here, such as that of a maintainer's own checkout."""
+    for name, address in (("pebble", '{"url": "file:///pebble", "dir_info": {}}'), ("gravel", "")):
+        information = tmp_path / f"{name}-1.1.dist-info"
+        information.mkdir()
+        (information / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.1\n")
+        if address:
+            (information / "direct_url.json").write_text(address)
+    monkeypatch.syspath_prepend(tmp_path)
+    found = [PathDistribution(folder) for folder in tmp_path.glob("*.dist-info")]
+    monkeypatch.setattr("importlib.metadata.distributions", lambda: found)
+    monkeypatch.setattr("evoclaims.cli.elsewhere.make", lambda *_: Environment(tmp_path / "made", installed_here()))
+    said = "it is what is installed here from file:///pebble, no release: an edit without a new version is not seen"
+    out = [evoclaims("across", "--package", name, "1.0", "1.1")[1] for name in ("pebble", "gravel")]
+    assert f"\npebble 1.1: {said}\n" in out[0]
+    assert [text.count("no release") for text in out] == [2, 0]  # while it is made, and below the table
 
 
 def test_a_run_that_a_signal_kills_is_said_so_with_the_function(

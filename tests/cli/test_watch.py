@@ -163,6 +163,17 @@ def test_a_broken_claim_takes_no_condition_from_the_watch(watching: Evoclaims, p
     assert sorted(stored.ids()) == before
 
 
+def test_a_condition_that_no_claim_reads_any_longer_is_said_until_a_series_begins(
+    watching: Evoclaims, project: Project
+) -> None:
+    """A claim may be skipped with some release: its condition must not leave the watch unseen."""
+    project.write(a="supported", b="pytest.skip('not with this release')")
+    said = "No longer watched, since no claim reads it: wrong on parity."
+    assert [said in watching("watch", "--trials=2", *more)[1] for more in ((), (), ("--restart",))] == [
+        *(True, True, False)
+    ]
+
+
 def assert_refused(watching: Evoclaims, says: str, *options: str) -> None:
     status, out, err = watching("watch", *options)
     assert (status, out) == (2, "")

@@ -33,6 +33,11 @@ def case(trial):
     return make
 
 
+def turned(values: list[float], by: int) -> list[float]:
+    """Return values of other seeds, so that conditions do not repeat each other."""
+    return [values[(at + by) % len(values)] for at in range(len(values))]
+
+
 def test_trials_like_the_references_have_not_drifted(case) -> None:
     (row,) = check_drift([case([0.51, 0.55, 0.59, 0.63, 0.67])]).rows
     assert (row.status, row.drifted, row.n_new, row.n_ref) == ("no drift", False, 5, 10)
@@ -88,7 +93,7 @@ def test_what_cannot_have_changed_costs_nothing(case, trial) -> None:
 def test_a_method_is_tested_by_all_its_conditions_together(case) -> None:
     """No condition alone shows what five of them show together; it is named where it shows most."""
     up = [0.56, 0.60, 0.64, 0.68, 0.70, 0.72]
-    cases = [case([*up[n:], *up[:n]], label=f"ppo on {n}", method="ppo") for n in range(5)]
+    cases = [case(turned(up, n), turned(BEFORE, 3 * n), label=f"ppo on {n}", method="ppo") for n in range(5)]
     others = [case(BEFORE[::2], label=f"m{n} on t", method=f"m{n}") for n in range(5)]
     together = check_drift([*cases, *others])
     assert [row.label for row in together.rows if row.drifted] == ["ppo on 0"]
@@ -104,6 +109,15 @@ def test_where_a_drift_shows_is_asked_at_the_level_at_which_it_was_found(case) -
     up = [0.56, 0.60, 0.64, 0.68, 0.70, 0.72]
     found = check_drift([case(up, label=f"ppo on {n}", method="ppo") for n in range(2)], alpha=0.2)
     assert [row.drifted for row in found.rows] == [True, True]
+
+
+def test_conditions_that_repeat_each_other_count_once(case) -> None:
+    """They share seeds, and may share random numbers: so what one seed does in each of five is no news."""
+    new = [0.59, 0.61, 0.63, 0.65, 0.67]
+    alone = check_drift([case(new, method="ppo")])
+    five = check_drift([case(new, label=f"ppo on {n}", method="ppo") for n in range(5)])
+    assert five.rows[0].p_holm == pytest.approx(alone.rows[0].p_holm, rel=0.3)
+    assert five.detectable == pytest.approx(alone.detectable)
 
 
 def test_the_joint_p_is_that_of_all_permutations(case) -> None:
@@ -127,7 +141,7 @@ def test_a_condition_with_more_trials_counts_for_more(case, monkeypatch: pytest.
     """One has moved, with many trials on both sides; eight with few trials have not, and add almost no noise."""
     rng = np.random.default_rng(3)
     moved = case(rng.normal(0.8, 1, size=40).tolist(), rng.normal(size=100).tolist(), label="a on b", method="a")
-    few = [case([0.55, 0.59, 0.63], label=f"a on {n}", method="a") for n in range(8)]
+    few = [case(turned([0.55, 0.59, 0.63], n), turned(BEFORE, 3 * n), label=f"a on {n}", method="a") for n in range(8)]
     weighted = check_drift([moved, *few])
     assert weighted.detectable["a"] < check_drift([moved]).detectable["a"]
     monkeypatch.setattr(joint_test.Columns, "seen", 1.0)
@@ -151,7 +165,11 @@ def test_more_seeds_than_the_references_have_prove_nothing_if_those_are_the_same
     same = DriftCase("a on b", "c", (*old, *more), old, ("score",))
     assert [row.detail for row in check_drift([same]).rows] == ["the same trials to the bit"]
     other = replace(same, new=(replace(old[0], digest="other"), *old[1:], *more))
-    for new in (other.new, more):
+    mixed = [
+        (*old, *(replace(one, provenance=made) for one in more))
+        for made in ({"versions": {"jax": "2"}}, {"git": {"sha": "a"}}, {"code_hashes": {"mine.Method": "b"}})
+    ]
+    for new in (other.new, more, *mixed):
         assert [(row.p is None, row.n_new) for row in check_drift([replace(other, new=new)]).rows] == [
             (False, len(new))
         ]

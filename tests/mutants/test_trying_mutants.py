@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any, cast
 
 from hand_made_verdicts import report, verdict
+from made_trials import trial_of
 
 from evoclaims.envs.gates.parity import NParity
+from evoclaims.judging.design import Design
 from evoclaims.judging.verdict import Outcome
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.mutants.mutant import Planted
@@ -32,11 +36,18 @@ def judged(outcome: str = "supported", *, task: str = "maze") -> ClaimReport:
 class _Compared:
     """Stands for a comparison of trials: none is equivalent, none has drifted."""
 
-    def equivalent(self, names: Any, faulty: Condition) -> bool:
+    def equivalent(self, names: Any, faulty: Condition, curves: Any) -> bool:
         return False
 
     def drifted(self, names: Any, faulty: Condition) -> bool:
         return False
+
+
+class _SameEnds(_Compared):
+    """The same, but the trials differ in their curves alone."""
+
+    def equivalent(self, names: Any, faulty: Condition, curves: Any) -> bool:
+        return not curves
 
 
 def tried(planted: Planted, sound: ClaimReport, faulty: ClaimReport, failed: Any = ()) -> Sensitivity | None:
@@ -61,6 +72,28 @@ def test_a_condition_that_has_just_failed_is_broken_and_one_that_was_not_run_is_
     row = tried(BLIND, judged(), judged("not run"), failed={("neat: minimizes", NAMES)})
     assert row is not None
     assert row.attempts == ()
+
+
+def test_trials_that_differ_in_a_curve_are_not_equivalent_for_a_claim_that_reads_it() -> None:
+    """Else a claim that did not notice the fault would be spared it."""
+    for reads, fate in (("metrics.stones", Fate.EQUIVALENT), ("curves.fitness", Fate.SURVIVED)):
+        sound = judged()
+        sound = replace(sound, sources=tuple(replace(one, reads=(reads,)) for one in sound.sources))
+        row = noticed(cast(Comparison, _SameEnds()), [sound], [BLIND], [[judged()]], ())[key_of(sound)]
+        assert row.named(fate) == ("maze: blind",)
+
+
+def test_whether_trials_are_equivalent_is_asked_of_levels_metrics_and_some_curves() -> None:
+    def trials(condition: Condition, seeds: Any) -> Any:
+        curves = {"fitness": (math.nan,), "nodes": (float(condition is faulty),)}
+        return [trial_of(condition, seed, 0.5, curves=curves) for seed in seeds]
+
+    faulty = replace(CONDITION, budget=Budget(generations=2))
+    tier = SimpleNamespace(design=Design.fixed(2), condition=lambda *_: CONDITION)
+    archive, paper = SimpleNamespace(trials=trials), SimpleNamespace(tier=lambda _: tier)
+    comparison = Comparison(cast(Any, archive), cast(Any, paper), "smoke", frozenset())
+    found = [comparison.equivalent(NAMES, faulty, curves) for curves in ((), ("fitness",), ("fitness", "nodes"))]
+    assert found == [True, True, False]
 
 
 def attempt(planted: Planted, fate: Fate) -> Attempt:

@@ -20,6 +20,23 @@ HERE = version("numpy")
 Sentence = Callable[[pytest.RunResult, str], None]
 
 
+LATE = """
+
+@pytest.fixture
+def waits():
+    import time
+    from pathlib import Path
+    while len(list(Path(".evoclaims/trials").glob("*/*.json"))) < 20:
+        time.sleep(0.05)
+
+
+@says("late")
+def test_late(waits, trials, verdict):
+    verdict(trials("right", on="parity").solves_every_level.in_most_trials())
+"""
+"""A claim with a fixture of its own."""
+
+
 @pytest.fixture
 def aged(project: Any, stored: Store) -> Callable[..., None]:
     """A function that makes a store of the claim `a` whose first `count` trials numpy 1.0 has made, all wrong."""
@@ -70,6 +87,19 @@ def test_trials_of_other_versions_run_again_and_the_summary_says_what_that_chang
     told = json.loads((project.path / "out.json").read_text())["upgrade"]["conditions"]
     assert [(one["condition"], one["again"], one["changed"]) for one in told] == [("right on parity (smoke)", 10, 10)]
     assert [(one["old"]["numpy"], one["new"]["numpy"]) for one in told] == [("1.0", HERE)]
+
+
+def test_trials_that_other_processes_ran_again_before_their_claim_was_due_count_as_such(
+    project: Any, aged: Callable[..., None]
+) -> None:
+    """The claim `late` is the first, as nothing is known of its trials; it waits until those of `a` are there."""
+    aged(10)
+    file = project.path / "claims" / "test_claims.py"
+    file.write_text(file.read_text() + LATE)
+    result = project.run_apart("--claims-processes=2")
+    lines = _lines(result)
+    assert "right on parity (smoke): 10 trials run again, 10 of 10 not the same to the bit as before" in lines
+    assert result.ret == 1
 
 
 def test_the_run_after_that_runs_nothing_and_passes(project: Any, aged: Callable[..., None]) -> None:

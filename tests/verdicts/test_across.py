@@ -11,6 +11,7 @@ import pytest
 from hand_made_verdicts import report
 from made_trials import trial_of
 
+from evoclaims.cli.bisect import KINDS, _unchanged
 from evoclaims.core.packages import recorded
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.hand_built import HandBuilt
@@ -105,6 +106,44 @@ def test_trials_that_are_the_same_records_are_not_compared(store: Store) -> None
     again = replace(_environment(store, "1"), label="again")
     cell = across([_environment(store, "1"), again]).cells["ours", "again"]
     assert across_report.cell_lines(cell) == ("✓ supported", "the same trials")
+
+
+def test_a_claim_that_only_one_environment_has_is_a_change(store: Store) -> None:
+    """As where its cases are a list of the package."""
+    one, two = _environment(store, "1"), _environment(store, "2")
+    without = replace(two, reports={"plain": two.reports["plain"]}, trials={})
+    gone, new = across([one, without]), across([without, replace(one, label="jax 1")])
+    assert gone.changed == {"jax 2": ["ours"]}
+    assert gone.lines[0] == "jax 2: ours: supported -> not run (there is no such claim in it)"
+    assert across_report.headline(gone) == "jax 2 changes ours."
+    assert [row["outcome"] for row in across_report.rows(gone) if row["claim"] == "ours"] == ["supported", "not run"]
+    assert new.changed == {"jax 1": ["ours"]}
+    assert across_report.cell_lines(new.cells["ours", "jax 1"]) == ("✓ supported, CHANGED", "–")
+
+
+def test_trials_of_which_some_cannot_be_compared_are_not_the_same_to_the_bit(store: Store) -> None:
+    first = _environment(store, "1")
+    (trials,) = first.trials.values()
+    first = replace(first, trials=dict.fromkeys(first.trials, trials[:4]))
+    cell = across([first, _environment(store, "2")]).cells["ours", "jax 2"]
+    assert across_report.cell_lines(cell) == ("✓ supported", "0 of 4 differ")
+
+
+def test_trials_that_the_first_environment_lacks_are_not_called_the_same(store: Store) -> None:
+    first = _environment(store, "1", "error")
+    source = replace(first.reports["ours"].sources[0], trials=())
+    first = judged("jax 1", [replace(first.reports["ours"], sources=(source,))], store)
+    cell = across([first, _environment(store, "2")]).cells["ours", "jax 2"]
+    assert across_report.cell_lines(cell) == ("✓ supported, CHANGED", "–")
+
+
+def test_what_did_not_change_is_said_as_far_as_it_was_compared(store: Store) -> None:
+    one, two = (replace(_environment(store, version), label=version) for version in "12")
+    only = [replace(each, reports={"ours": each.reports["ours"]}) for each in (one, two, replace(one, label="again"))]
+    said = "the same verdict, no drift shown, 10 trials the same to the bit"
+    assert _unchanged(only[0], only[1], list(KINDS)) == said
+    said = "the same verdict, the same trials, since none depends on it"
+    assert _unchanged(only[0], only[2], list(KINDS)) == said
 
 
 def test_the_first_environment_is_the_first_that_has_verdicts(store: Store) -> None:

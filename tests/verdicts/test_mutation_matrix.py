@@ -41,7 +41,7 @@ def test_a_mutant_is_killed_where_the_outcome_differs_and_only_there(
         assert became is (Fate.DRIFTED if drifted else Fate.SURVIVED)
     else:
         assert became is Fate.KILLED
-    # A claim may read curves, which are not compared.
+    # Whatever a claim reads that is not compared.
     of_equal_trials = fate(sound, faulty, equivalent=True, drifted=drifted)
     assert of_equal_trials is (Fate.EQUIVALENT if faulty is sound else became)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -11,6 +11,7 @@ from evoclaims.cli.elsewhere import between, opened, released
 from evoclaims.core.environments import Recipe, checked, checked_name
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.judging.verdict import Outcome
+from evoclaims.report.formatting import plural
 from evoclaims.verdicts.across import Cell, Judged, across
 
 
@@ -80,18 +81,22 @@ def main(options: argparse.Namespace) -> int:
             )
     kinds = [kind for kind in KINDS if options.by in (None, kind) and _differs(tried[0], tried[last], kind)]
     if not kinds:
-        sought = options.by or "verdict, the distribution and the bits"
-        print(f"The {sought} of {options.claim} did not change between {package} {good} and {bad}.")
+        found = _unchanged(tried[0], tried[last], [kind for kind in KINDS if options.by in (None, kind)])
+        print(f"{options.claim} with {package} {bad} as with {good}: {found}.")
         return 1
-    what = f"The {kinds[0]} of {options.claim}"
-    print(f"{what} changed from {package} {good} to {bad}, with {last - 1} releases between them.", flush=True)
-    at_the_ends = _broken(tried[0]) | _broken(tried[last])
+    kind = kinds[0]
+    print(
+        f"The {kind} of {options.claim} changed from {package} {good} to {bad}, with {last - 1} releases between them.",
+        flush=True,
+    )
+    claims = tried[0].reports.keys() | tried[last].reports.keys()
+    at_the_ends = _broken(tried[0], claims) | _broken(tried[last], claims)
 
     def has_changed(index: int) -> bool | None:
         now = judge(index)
-        return None if now.trouble or _broken(now) - at_the_ends else _differs(tried[0], now, kinds[0])
+        return None if now.trouble or _broken(now, claims) - at_the_ends else _differs(tried[0], now, kind)
 
-    _tell(bisect(len(releases), has_changed), releases, tried, package, what)
+    _tell(bisect(len(releases), has_changed), releases, tried, package, kind, options.claim)
     return 0
 
 
@@ -100,14 +105,31 @@ def _differs(first: Judged, now: Judged, kind: str) -> bool:
     return any(KINDS[kind](cell) for (_, label), cell in across([first, now]).cells.items() if label == now.label)
 
 
-def _broken(judged: Judged) -> set[tuple[str, Outcome]]:
-    """Return the claims that broke or did not run: no sign of the change, unless they do so at one of the ends."""
-    return {(name, report.outcome) for name, report in judged.reports.items() if not report.outcome.judged}
+def _unchanged(first: Judged, last: Judged, kinds: Collection[str]) -> str:
+    """Return in words what of these kinds is the same at both ends, as far as it could be compared."""
+    cells = [cell for (_, label), cell in across([first, last]).cells.items() if label == last.label]
+    compared = sum(cell.compared for cell in cells)
+    tested = compared or any(cell.drift is not None for cell in cells)  # the same bits need no test
+    found = {
+        "verdict": "the same verdict",
+        "drift": "no drift shown" if tested else "no trials tested for drift",
+        "bits": f"{plural(compared, 'trial')} the same to the bit" if compared else "no trial compared to the bit",
+    }
+    if all(cell.same for cell in cells):
+        found |= dict.fromkeys(("drift", "bits"), "the same trials, since none depends on it")
+    return ", ".join(dict.fromkeys(found[kind] for kind in kinds))
 
 
-def _tell(change: Change, releases: list[str], tried: Mapping[int, Judged], package: str, what: str) -> None:
+def _broken(judged: Judged, claims: Collection[str]) -> set[tuple[str, Outcome]]:
+    """Return the claims that broke, did not run or are missing: no sign of the change, unless so at one of the ends."""
+    return {(name, outcome) for name in claims if not (outcome := judged.outcome(name)).judged}
+
+
+def _tell(
+    change: Change, releases: list[str], tried: Mapping[int, Judged], package: str, kind: str, claim: str
+) -> None:
     """Print where it changed, what is known about it, and how many environments that took."""
-    before, after = releases[change.before], releases[change.after]
+    before, after, what = releases[change.before], releases[change.after], f"The {kind} of {claim}"
     for line in across([tried[change.before], tried[change.after]]).lines:
         print(f"  {line}")
     if change.unknown:
@@ -115,5 +137,6 @@ def _tell(change: Change, releases: list[str], tried: Mapping[int, Judged], pack
         for index in change.unknown:
             print(f"  {tried[index].label}: {tried[index].trouble or 'the claim is broken or not run there'}")
     else:
-        print(f"{what} changed in {package} {after}; {before} was still as {releases[0]}.")
+        still = "shows no drift from" if kind == "drift" else "was still as"
+        print(f"{what} changed in {package} {after}; {before} {still} {releases[0]}.")
     print(f"environments: {len(tried)}, for {len(releases)} releases")

@@ -9,18 +9,19 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from packaging.utils import canonicalize_name
 from packaging.version import Version
 
 from evoclaims.claims.claim_names import selected
 from evoclaims.cli.project import open_project
 from evoclaims.cli.store_folder import open_store
 from evoclaims.cli.terminal import terminal
-from evoclaims.core.environments import PIP, Environment, NotInstallableError, Recipe, ending, make, reason
+from evoclaims.core.environments import PIP, Environment, NotInstallableError, Recipe, ending, folder_of, make, reason
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.files import at_once, read_json
 from evoclaims.core.printable import printable
@@ -31,6 +32,7 @@ from evoclaims.report.table_cells import totals
 from evoclaims.trials.store import Store
 from evoclaims.verdicts.across import Judged, judged
 from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.source_trials import in_words, versions_of
 
 KEPT = "environments"
 """Folder of the environments, in the store."""
@@ -74,6 +76,9 @@ class Elsewhere:
             moved = environment.moved(recipe.package) if recipe.is_layer else {}
             also = ", ".join(f"{name} {was or 'none'} -> {now}" for name, (was, now) in moved.items())
             notes = f"its installation changed {also}, too" if also else ""
+            if recipe.is_layer and (folder := folder_of(recipe.package, recipe.version)):
+                notes += f"{notes and '; '}it is what is installed here from {folder}, no release: "
+                notes += "an edit without a new version is not seen"
             if notes:
                 print(f"{label}: {notes}", flush=True)
             if below := environment.below(recipe.package, self.root):
@@ -105,6 +110,11 @@ class Elsewhere:
             raise NotJudgedError(f"pytest cannot be run there ({error})") from error
         if not reports or status not in (0, 1, 5):  # pytest's: all well, failures, and nothing measured
             raise NotJudgedError(f"pytest {ending(status)}{_last_words(status, output)}")
+        if others := _of_other_versions(reports, environment):
+            raise NotJudgedError(
+                f"its claims were judged from trials of {others}, which is not what is installed there; "
+                "leave --claims-any-version and --claims-stored out of PYTEST_ADDOPTS"
+            )
         return reports
 
     def _command(self, environment: Environment, store: Store, verdicts: Path) -> list[str]:
@@ -118,6 +128,14 @@ class Elsewhere:
             *(f"--claims-storage={store.root.absolute()}", f"--claims-json={verdicts}"),
             *([] if self.only is None else [f"--claims-only={self.only}"]),
         ]
+
+
+def _of_other_versions(reports: Sequence[ClaimReport], environment: Environment) -> str:
+    """Return which versions that are not the environment's have made trials of claims, in words; empty if none has."""
+    made_with = versions_of(source for report in reports for source in report.sources)
+    here = {name: environment.versions.get(canonicalize_name(name)) for name in made_with}
+    others = {name: those for name, those in made_with.items() if here[name] is not None and those != (here[name],)}
+    return ", ".join(f"{name} {in_words(those)}" for name, those in others.items())
 
 
 def _too_old(below: Mapping[str, tuple[str, str]]) -> str:

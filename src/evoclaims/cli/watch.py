@@ -62,9 +62,12 @@ def main(options: argparse.Namespace) -> int:
     found = tuple(line for those in alarms.values() for line in those)
     series = (*going_on, structs.replace(series[-1], alarms=found, restart=options.restart))
     watch_file.append(path, before, series[-1])
-    stay = watch_file.standing([*(night for night in nights if night.tier == watch.tier), series[-1]])
+    mine = [*(night for night in nights if night.tier == watch.tier), series[-1]]
+    stay = watch_file.standing(mine)
     shown = [*found, *(line for one, more in stay.items() for line in (one, *more))]
-    sentences = _sentences(watch, series, left_out, shown, path)
+    had = {label for night in watch_file.since_restart(mine) for label in night.values}
+    gone = sorted(had - {*left_out, *(one.label for one in watch.conditions)})
+    sentences = _sentences(watch, series, left_out, gone, shown, path)
     console = PlainSpokenConsole(file=styled())
     console.print_whole(plain_table(_headings(), _rows(watch, series[-1])))
     print(*sentences, sep="\n")
@@ -197,7 +200,12 @@ def _found_in(watch: Watch, family: Family, shift: float, night: Night) -> str:
 
 
 def _sentences(
-    watch: Watch, series: Sequence[Night], left_out: Sequence[str], alarms: Sequence[str], path: Path
+    watch: Watch,
+    series: Sequence[Night],
+    left_out: Sequence[str],
+    gone: Sequence[str],
+    alarms: Sequence[str],
+    path: Path,
 ) -> list[str]:
     """Return what a night has shown, and what to do next."""
     last, families = series[-1], plural(len(watch.families), "family", "families")
@@ -214,6 +222,11 @@ def _sentences(
         )
     if left_out:
         lines.append(f"Not watched, for want of ten committed trials: {', '.join(left_out)}.")
+    if gone:
+        lines.append(
+            f"No longer watched, since no claim reads it: {', '.join(gone)}. If this is meant, begin a new series with "
+            "--restart."
+        )
     lines += alarms
     if alarms:
         lines.append(

@@ -224,6 +224,16 @@ def installed_here() -> dict[str, str]:
     return _normalized({name: version for name, version in reversed(found) if name})
 
 
+def folder_of(package: str, version: str) -> str:
+    """Return the address of the folder or repository that a version of a package was installed from here; else empty.
+
+    An installer takes it for the release of that number, which may hold something else.
+    """
+    if installed_here().get(canonicalize_name(package)) != version:
+        return ""
+    return str(_origin(package).get("url", ""))
+
+
 def _oldest(project: Path) -> dict[str, Version]:
     """Return the oldest version of each package that evoclaims and the project declare to work, by normalized name."""
     found: dict[str, Version] = {}
@@ -300,13 +310,19 @@ def _described(project: Path) -> dict[str, Any]:
 def _this_program() -> list[str]:
     """Return evoclaims as it was installed here: from a folder, from a repository, or as a release."""
     distribution = importlib.metadata.distribution(PROGRAM)
-    origin: dict[str, Any] = json.loads(distribution.read_text("direct_url.json") or "{}")
+    origin = _origin(PROGRAM)
     url, repository = str(origin.get("url", "")), origin.get("vcs_info")
     if repository:
         return [f"{PROGRAM} @ {repository['vcs']}+{url}@{repository['commit_id']}"]
     if url.startswith("file://"):
         return [*["--editable"] * bool(origin.get("dir_info", {}).get("editable")), url2pathname(urlsplit(url).path)]
     return [f"{PROGRAM}=={distribution.version}"]
+
+
+def _origin(package: str) -> dict[str, Any]:
+    """Return what says where a package was installed from here; empty for a release."""
+    origin: dict[str, Any] = json.loads(importlib.metadata.distribution(package).read_text("direct_url.json") or "{}")
+    return origin
 
 
 def _pins(recipe: Recipe) -> str:

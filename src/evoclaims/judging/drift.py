@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evoclaims.core.printable import printable
+from evoclaims.core.source_code import CODE
 from evoclaims.judging.drift_report import DriftReport, DriftRow, DriftStatus
 from evoclaims.judging.effect import a12, median
 from evoclaims.judging.exact import holm, rank_attainable, two_sided_rank_p
@@ -165,7 +166,8 @@ def _prepared(case: DriftCase) -> tuple[list[Columns], list[DriftRow]]:
         return [], every("error", f"trials crashed: seeds {', '.join(map(str, crashed))}")
     before = {trial.seed: trial.digest for trial in reference}
     again = [trial for trial in new if trial.seed in before]  # of other seeds there is nothing to compare bits with
-    if again and all(trial.digest and before[trial.seed] == trial.digest for trial in again):
+    alike = [trial for trial in again if trial.digest and before[trial.seed] == trial.digest]
+    if again and len(alike) == len(again) and all(_by_one_code(again[0], trial) for trial in new):
         return [], every("no drift", "the same trials to the bit")
     pilot = [trial for trial in case.pilot if trial.status == "done"]
     known = [metric for metric in case.metrics if pilot and all(_has(trial, metric) for trial in pilot)]
@@ -177,6 +179,11 @@ def _prepared(case: DriftCase) -> tuple[list[Columns], list[DriftRow]]:
     if conditions or len(constant) < len(without):
         return conditions, [row for row in without if row.status != "no drift"]
     return [], constant[:1]
+
+
+def _by_one_code(one: TrialResult, other: TrialResult) -> bool:
+    """Whether two trials were made by the same code, as far as they tell: a store may mix those of several versions."""
+    return all(one.provenance.get(part) == other.provenance.get(part) for part in ("versions", "git", CODE))
 
 
 def _has(trial: TrialResult, metric: str) -> bool:
@@ -215,7 +222,8 @@ def _columns(
             ranks.append(ranked)
         else:
             without.append(replace(found, p_holm=1.0))
-    return (Columns(tuple(tested), np.stack(ranks, axis=1), len(new), wide) if tested else None), without
+    trials = tuple((side, trial.seed) for side, those in (("new", new), ("earlier", earlier)) for trial in those)
+    return (Columns(tuple(tested), np.stack(ranks, axis=1), len(new), trials, wide) if tested else None), without
 
 
 def _number_of(trial: TrialResult, label: str, metric: str) -> float:

@@ -40,12 +40,14 @@ class Columns:
         rows: of its measures that are not constant, each with its own exact two-sided p; at least one.
         centred: mid-ranks minus their mean, by trial, new ones first, and measure; shape [n_new + n_ref, measures].
         n: number of new trials.
+        trials: side and seed of each trial, in the same order: trials of one seed may depend on each other.
         wide: whether the pilot's trials are among the earlier ones.
     """
 
     rows: tuple[DriftRow, ...]
     centred: NDArray[np.float64]
     n: int
+    trials: tuple[tuple[str, int], ...]
     wide: bool
 
     @property
@@ -85,11 +87,12 @@ def joint_p(conditions: Sequence[Columns], count: int) -> float:
     """Return the p of the hypothesis that nothing changed in some conditions.
 
     A single measure of a single condition has its exact p. Else new and earlier trials are exchanged at random, whole
-    trials within each condition, `count` times with a fixed seed. Three statistics of the measures' rank sums z
+    trials within each condition, `count` times with a fixed seed. Trials of one seed are exchanged together in all
+    conditions, as they may share random numbers. Three statistics of the measures' rank sums z
     look for three kinds of change: the sum over conditions (all better, or all worse), the sum of squares (anything),
     and the largest (one alone). In the sum, a condition counts by the shift that its numbers of trials can show. Their
     smallest p is itself compared with its distribution over the permutations, so that p is valid for any dependence
-    of measures.
+    of measures, and of conditions that have the same seeds.
     """
     if len(conditions) == 1 and len(conditions[0].rows) == 1:
         return conditions[0].rows[0].p or 1.0
@@ -101,12 +104,15 @@ def _permuted(conditions: Sequence[Columns], count: int) -> float:
     rng = np.random.default_rng(SEED)
     sums = np.zeros(count + 1)
     squares, largest = np.zeros_like(sums), np.zeros_like(sums)
-    for one in conditions:
-        drawn = [one.centred[: one.n].sum(axis=0)[None]]
-        for begin in range(0, count, CHUNK):
-            keys = rng.random((min(CHUNK, count - begin), len(one.centred)))
-            drawn.append(one.centred[np.argpartition(keys, one.n, axis=1)[:, : one.n]].sum(axis=1))
-        z = np.concatenate(drawn) / one.spread
+    place = {trial: at for at, trial in enumerate(sorted({trial for one in conditions for trial in one.trials}))}
+    drawn = [[one.centred[: one.n].sum(axis=0)[None]] for one in conditions]
+    for begin in range(0, count, CHUNK):
+        keys = rng.random((min(CHUNK, count - begin), len(place)))
+        for one, those in zip(conditions, drawn, strict=True):
+            mine = keys[:, [place[trial] for trial in one.trials]]
+            those.append(one.centred[np.argpartition(mine, one.n, axis=1)[:, : one.n]].sum(axis=1))
+    for one, those in zip(conditions, drawn, strict=True):
+        z = np.concatenate(those) / one.spread
         together = z.sum(axis=1)
         sums += one.seen * together / max(float(together.std()), 1e-12)
         squares += (z**2).mean(axis=1)
@@ -143,4 +149,16 @@ def detectable_shift(conditions: Sequence[Columns], alpha: float) -> float:
     sides = {one.wide for one in conditions}
     share = _share_of(max(sides), len(sides))
     z = float(norm.isf(alpha * share / (2 * 3)) + norm.ppf(FOUND))
-    return z / math.hypot(*(one.seen for one in conditions if one.wide is max(sides)))
+    tested = [one for one in conditions if one.wide is max(sides)]
+    return z * _spread_of_sum(tested) / sum(one.seen**2 for one in tested)
+
+
+def _spread_of_sum(conditions: Sequence[Columns]) -> float:
+    """Return the standard deviation of the sum over conditions, which is larger where their trials vary together."""
+    total: dict[tuple[str, int], float] = {}
+    for one in conditions:
+        scores = (one.centred / one.spread).sum(axis=1)
+        scores *= one.seen / max(float(np.linalg.norm(scores)), 1e-12)
+        for trial, score in zip(one.trials, scores.tolist(), strict=True):
+            total[trial] = total.get(trial, 0.0) + score
+    return math.hypot(*total.values())

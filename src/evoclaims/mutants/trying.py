@@ -40,11 +40,18 @@ class Comparison:
     tier: str
     used: frozenset[Names]
 
-    def equivalent(self, names: Names, faulty: Condition) -> bool:
-        """Whether every faulty trial has the results of the sound one of its seed."""
-        sound = self._trials(self._sound(names))
-        pairs = zip(sound, self._trials(faulty), strict=True)
-        return all(a and b and (a.status, a.levels, a.metrics) == (b.status, b.levels, b.metrics) for a, b in pairs)
+    def equivalent(self, names: Names, faulty: Condition, curves: Collection[str]) -> bool:
+        """Whether every faulty trial ends as the sound one of its seed, and has the same of the `curves` that count."""
+        pairs = list(zip(self._trials(self._sound(names)), self._trials(faulty), strict=True))
+        return all(
+            a
+            and b
+            and (a.status, a.levels, a.metrics) == (b.status, b.levels, b.metrics)
+            and all(
+                repr(a.curves.get(name)) == repr(b.curves.get(name)) for name in curves
+            )  # NaN is not equal to itself
+            for a, b in pairs
+        )
 
     def drifted(self, names: Names, faulty: Condition) -> bool:
         """Whether faulty trials drift from the reference trials, at the drift check's strictest correction."""
@@ -90,9 +97,9 @@ def noticed(
     }
 
     @cache
-    def compared(fault: str, names: Names) -> tuple[bool, bool]:
+    def compared(fault: str, names: Names, curves: tuple[str, ...]) -> tuple[bool, bool]:
         condition = conditions[fault, names]
-        return comparison.equivalent(names, condition), comparison.drifted(names, condition)
+        return comparison.equivalent(names, condition, curves), comparison.drifted(names, condition)
 
     conditions = {(one.name, names): condition for one in planted for names, condition in one.conditions.items()}
 
@@ -103,7 +110,8 @@ def noticed(
         elif outcome is Outcome.NOT_RUN:
             return None
         else:
-            equivalent, drifted = zip(*(compared(one.name, names) for names in touched), strict=True)
+            found = (compared(one.name, names, _curves(report, names)) for names in touched)
+            equivalent, drifted = zip(*found, strict=True)
             became = fate(report.outcome, outcome, equivalent=all(equivalent), drifted=any(drifted))
         return Attempt(one.mutant, one.part, one.target, outcome if became is Fate.KILLED else report.outcome, became)
 
@@ -117,6 +125,12 @@ def noticed(
         )
 
     return {key_of(report): row(report) for report in sound if report.outcome.judged}
+
+
+def _curves(report: ClaimReport, names: Names) -> tuple[str, ...]:
+    """Return the curves that a claim reads of a condition's trials."""
+    reads = {read for source in report.sources if (source.method, source.task) == names for read in source.reads}
+    return tuple(sorted(read.removeprefix("curves.") for read in reads if read.startswith("curves.")))
 
 
 def merged(before: Matrix, now: Matrix, tier: str, applicable: Mapping[tuple[str, str], Collection[str]]) -> Matrix:

@@ -6,6 +6,7 @@ Nothing heavy is imported here at the top: pytest loads this file in every run o
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
 import pytest
@@ -17,6 +18,8 @@ from evoclaims.trials.gpus import gpus
 
 if TYPE_CHECKING:
     from evoclaims.claims.claim import ClaimTest
+    from evoclaims.claims.session import Session
+    from evoclaims.claims.workload import Workload
 
 _OTHER_ORDERS: Final = ("failedfirst", "newfirst", "stepwise")
 """Options that ask for an order of tests, or depend on it."""
@@ -46,12 +49,24 @@ def prepare(session: pytest.Session, tests: dict[pytest.Item, ClaimTest]) -> Non
         claims, workers = soonest_first(load), 1
     else:
         seeds = {tier: judging.design(tier).seeds(judging.design(tier).last.n) for tier in judging.reproduction.tiers}
+        _note_outdated(judging, load, seeds)
         claims, workers = ahead.start(load, seeds), ahead.processes
     line = progress_of(config)
     if line is not None:
         line.begin(load, workers, tick=ahead is not None)
     if not any(config.getoption(name, False) for name in _OTHER_ORDERS):
         session.items[:] = in_order(session.items, claims)
+
+
+def _note_outdated(judging: Session, load: Workload, seeds: Mapping[str, Sequence[int]]) -> None:
+    """Note which trials are run again because of their versions, before other processes have run them."""
+    from evoclaims.claims.fetching import RunMissing
+
+    if isinstance(judging.fetch, RunMissing):
+        for work in load.conditions.values():
+            condition = judging.reproduction.tier(work.tiers[0], judging.variant).condition(*work.names)
+            due = {seed for tier in work.tiers for seed in seeds[tier]}
+            judging.fetch.note_outdated(condition, [seed for seed in work.missing if seed in due])
 
 
 def in_order(items: list[pytest.Item], claims: list[str]) -> list[pytest.Item]:

@@ -15,9 +15,9 @@ from evoclaims.core.files import read_file, write_atomically
 from evoclaims.report.console import SpelledTable
 from evoclaims.report.formatting import literal, p_value, plural, table
 from evoclaims.report.table_cells import NONE
-from evoclaims.verdicts.across import Across, Cell
+from evoclaims.verdicts.across import Across, Cell, Judged
 from evoclaims.verdicts.export import Row
-from evoclaims.verdicts.source_trials import versions_of
+from evoclaims.verdicts.source_trials import SourceTrials, versions_of
 
 COLUMN: Final = 22
 """Characters that an environment takes in the terminal, with the space before it."""
@@ -75,7 +75,7 @@ def headline(found: Across) -> str:
     compared = len(found.environments) - 1
     if not compared:
         return "There is one environment alone, so that nothing is compared."
-    return f"No verdict changed and no trial drifted in {plural(compared, 'environment')} after the first."
+    return f"No verdict changed and no drift was shown in {plural(compared, 'environment')} after the first."
 
 
 def rows(found: Across) -> list[Row]:
@@ -95,7 +95,7 @@ def rows(found: Across) -> list[Row]:
                 f"drift_{name}": getattr(cell.drift, name, None)
                 for name in ("metric", "a12", "p_holm", "median_ref", "median_new")
             },
-            "versions": {name: list(those) for name, those in versions_of(one.reports[claim].sources).items()},
+            "versions": {name: list(those) for name, those in versions_of(_sources(one, claim)).items()},
             "trouble": "",
         }
         for one in found.environments
@@ -103,6 +103,10 @@ def rows(found: Across) -> list[Row]:
         if (cell := found.cells.get((claim, one.label))) is not None
     ]
     return judged + [{"environment": one.label, "trouble": one.trouble} for one in found.environments if one.trouble]
+
+
+def _sources(one: Judged, claim: str) -> Sequence[SourceTrials]:
+    return one.reports[claim].sources if claim in one.reports else ()
 
 
 def cell_lines(cell: Cell | None) -> tuple[str, ...]:
@@ -113,8 +117,8 @@ def cell_lines(cell: Cell | None) -> tuple[str, ...]:
     if cell.was is None:
         return (verdict,)
     if not cell.repeated:
-        return verdict, "the same trials" if cell.n else NONE
-    if cell.compared and not cell.changed and not cell.drifted:
+        return verdict, "the same trials" if cell.n and cell.same else NONE
+    if cell.whole and not cell.changed and not cell.drifted:
         return verdict, "same to the bit"
     bits = f"{cell.changed} of {cell.compared} differ" if cell.compared else "other machine"
     if cell.drift is None:

@@ -33,6 +33,10 @@ class Judged:
     trouble: str = ""
     notes: str = ""
 
+    def outcome(self, claim: str) -> Outcome:
+        """Return how a claim ended: "not run" if there is no such claim, as where its cases come from the package."""
+        return self.reports[claim].outcome if claim in self.reports else Outcome.NOT_RUN
+
     def depends_on(self, package: str) -> bool:
         """Whether a judged trial depends on a package, whose other releases would else change nothing."""
         return any(package in source.versions for report in self.reports.values() for source in report.sources)
@@ -43,13 +47,15 @@ class Cell:
     """One claim in one environment.
 
     Attributes:
-        outcome: of its verdict there.
+        outcome: of its verdict there; "not run" if there is no such claim there.
         n: judged trials per side.
         was: its outcome in the first environment; None in that one itself.
         repeated: whether some of its trials were made anew, since they depend on what differs.
         compared: those of them that can be compared to the bit, by seed.
         changed: how many of these differ.
+        whole: whether all can be compared.
         drift: of what the drift check tested, the metric with the smallest p; None if it tested nothing.
+        same: whether its trials are those of the first environment, since they depend on nothing that differs.
     """
 
     outcome: Outcome
@@ -58,7 +64,9 @@ class Cell:
     repeated: bool = False
     compared: int = 0
     changed: int = 0
+    whole: bool = False
     drift: DriftRow | None = None
+    same: bool = False
 
     @property
     def drifted(self) -> bool:
@@ -111,7 +119,8 @@ class Across:
             for claim in self.claims:
                 cell = self.cells.get((claim, one.label))
                 if cell is not None and cell.verdict_changed:
-                    lines.append(f"{one.label}: {claim}: {cell.was} -> {cell.outcome}")
+                    gone = "" if claim in one.reports else " (there is no such claim in it)"
+                    lines.append(f"{one.label}: {claim}: {cell.was} -> {cell.outcome}{gone}")
             drift = self.upgrades[one.label].drift if one.label in self.upgrades else DriftReport((), 0)
             lines += [f"{one.label}: {line}" for line in drift.lines]
             if drift.nearest is not None and not drift.drifted:
@@ -147,9 +156,8 @@ def across(environments: Sequence[Judged]) -> Across:
     for one in with_reports:
         if first is not None and one is not first:
             upgrades[one.label] = upgrade(list(_successions(first, one)))
-        for name, report in one.reports.items():
-            before = first.reports.get(name) if first is not None and one is not first else None
-            cells[name, one.label] = _cell(report, before, upgrades.get(one.label))
+        for name in claims:
+            cells[name, one.label] = _cell(name, one, None if one is first else first, upgrades.get(one.label))
     return Across(tuple(environments), tuple(claims), cells, upgrades)
 
 
@@ -182,9 +190,11 @@ def _successions(first: Judged, now: Judged) -> Iterable[Succession]:
         yield Succession(label, was, is_now, before, trials, len(trials), source.method, tuple(sorted(reads)))
 
 
-def _cell(report: ClaimReport, before: ClaimReport | None, found: Upgrade | None) -> Cell:
-    cell = Cell(report.outcome, report.n, before.outcome if before else None)
-    if found is None:
+def _cell(name: str, one: Judged, first: Judged | None, found: Upgrade | None) -> Cell:
+    """Return the cell of a claim in an environment; `first` and `found` are None in the first one."""
+    report = one.reports.get(name)
+    cell = Cell(one.outcome(name), report.n if report else 0, first.outcome(name) if first else None)
+    if first is None or found is None or report is None:
         return cell
     labels = {source.label for source in report.sources}
     own = [one for one in found.successions if one.label in labels]
@@ -194,5 +204,7 @@ def _cell(report: ClaimReport, before: ClaimReport | None, found: Upgrade | None
         repeated=bool(own),
         compared=sum(len(one.pairs) for one in own),
         changed=sum(one.changed for one in own),
+        whole=all(len(one.pairs) == len(one.now) for one in own),
         drift=min(rows, key=lambda row: (not row.drifted, row.p_holm, row.p or 1.0), default=None),
+        same=bool(labels) and all(first.trials.get(label, ()) == one.trials.get(label) for label in labels),
     )

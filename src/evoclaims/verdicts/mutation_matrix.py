@@ -160,7 +160,7 @@ def fate(sound: Outcome, faulty: Outcome, *, equivalent: bool, drifted: bool) ->
     Args:
         sound: the claim's outcome without the fault.
         faulty: its outcome with it.
-        equivalent: whether all faulty trials equal the sound ones in levels and metrics; a claim may read curves.
+        equivalent: whether all faulty trials equal the sound ones in levels, metrics and curves that the claim reads.
         drifted: whether the drift check finds that a condition of the claim has drifted.
     """
     if equivalent and faulty is sound:

@@ -62,15 +62,19 @@ class Night(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True)
     restart: bool = False
 
 
+def since_restart(nights: Sequence[Night]) -> Sequence[Night]:
+    """Return the nights of a tier from the last one on with which a person has begun a series."""
+    return nights[max((at for at, night in enumerate(nights) if night.restart), default=0) :]
+
+
 def standing(nights: Sequence[Night]) -> dict[str, tuple[str, ...]]:
     """Return the alarms of a tier's series before the last, which stay until a person begins one: a line, and details.
 
     Args:
         nights: of the tier, at least one.
     """
-    begun = max((at for at, night in enumerate(nights) if night.restart), default=0)
     series: dict[int, list[Night]] = {}
-    for night in nights[begun:]:
+    for night in since_restart(nights):
         series.setdefault(night.series, []).append(night)
     del series[nights[-1].series]
     found = {}
