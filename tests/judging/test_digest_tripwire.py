@@ -33,6 +33,7 @@ def test_a_digest_that_differs_is_named_by_its_seed(trial) -> None:
         {"device": None},
         {"machine": None},
         {"versions": None},
+        {"instructions": "znver3 avx2"},  # of which the other says nothing
     ],
 )
 def test_another_machine_class_or_version_is_not_comparable(trial, other: dict[str, Any]) -> None:

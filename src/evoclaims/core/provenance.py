@@ -121,9 +121,11 @@ def differing(one: Mapping[str, Any], other: Mapping[str, Any]) -> set[str]:
 def same_bits(one: Mapping[str, Any], other: Mapping[str, Any], but: str = "") -> bool:
     """Whether one trial should have the same bits by two provenances, but for what the part `but` changes.
 
-    Only CPUs of one class of machine promise it. A provenance without device, machine or versions says too little.
+    Only CPUs of one class of machine promise it. A provenance without device, machine or versions says too little, and
+    so does one without the processor's instructions, as old ones are, beside one that has them.
     """
     known = all(made.get(part) for made in (one, other) for part in ("device", "machine", "versions"))
+    known &= ("instructions" in one) == ("instructions" in other)
     on_cpu = known and one["device"].get("platform") == other["device"].get("platform") == "cpu"
     return on_cpu and differing(one, other) <= {but}
 
