@@ -55,7 +55,7 @@ def test_the_page_has_it_and_shows_hostile_labels_as_they_are(
     text = whole(page)
     assert '<details class="chapter" id="across"' in text
     assert "changes B; evosax 9 has no verdicts." in text
-    assert "<td>✗ refuted, CHANGED<br>the same trials</td>" in text
+    assert "<td>✗ refuted, CHANGED<br>–</td>" in text
     assert "alert(1)" in text
     assert text.count("<script>") == 1
     assert 'id="across"' not in whole(filled.page())

@@ -321,7 +321,8 @@ def _this_program() -> list[str]:
 
 def _origin(package: str) -> dict[str, Any]:
     """Return what says where a package was installed from here; empty for a release."""
-    origin: dict[str, Any] = json.loads(importlib.metadata.distribution(package).read_text("direct_url.json") or "{}")
+    distribution = importlib.metadata.distribution(package)
+    origin: dict[str, Any] = json.loads(distribution.read_text("direct_url.json") or "{}")
     return origin
 
 
