@@ -198,7 +198,7 @@ def test_an_equivalence_needs_a_real_margin(source, margin) -> None:
         source("cma_es", []).score().equivalent_to(source("ppo", []).score(), margin=margin)
 
 
-@pytest.mark.parametrize("ends", [(2, 1), (-math.inf, 1), (0, math.inf), (math.nan, 1)])
+@pytest.mark.parametrize("ends", [(2, 1), (-math.inf, 1), (0, math.inf), (math.nan, 1), ("a", 1)])
 def test_a_band_needs_two_finite_ends_in_order(source, ends) -> None:
     with pytest.raises(UserError, match="band"):
         source("cma_es", []).score().between(*ends)

@@ -95,6 +95,7 @@ def test_each_event_holds_where_its_name_says(group: Any, event: Any, held: tupl
     [
         (lambda g: g.solves_level(-1), "2 levels, counted from 0: .* level -1 .* from 0 to 1"),
         (lambda g: g.solves_level(2), "2 levels, counted from 0: .* level 2 .* from 0 to 1"),
+        (lambda g: g.solves_level(0.5), "2 levels, counted from 0: .* level 0.5 .* from 0 to 1"),
         (lambda g: g.solves_no_level_beyond(1), "2 levels, counted from 0: .* level 1 .* from -1 to 0"),
         (lambda g: g.solves_no_level_beyond(-2), "level -2"),
         (lambda g: g.last_success_is(math.nan), "a success's value must be a finite number, not nan"),

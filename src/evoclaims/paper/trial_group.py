@@ -255,8 +255,8 @@ class TrialGroup:
         return self.event(f"solves no level beyond {level}", lambda t: t.metrics["furthest_solved"] <= level)
 
     def _require_level(self, level: int, first: int, last: int) -> None:
-        """Reject a level about which an event would always hold, or never."""
-        if not first <= level <= last:
+        """Reject what is no level, and a level about which an event would always hold, or never."""
+        if level not in range(first, last + 1):
             raise UserError(
                 f"{self.label} has {self.condition.task.levels} levels, counted from 0: an event at level {level} "
                 f"would always hold, or never. Use a level from {first} to {last}."

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from numbers import Real
 from typing import ClassVar
 
 from evoclaims.core.errors import UserError
@@ -39,10 +40,11 @@ class Band(Assertion):
 
     def __post_init__(self) -> None:
         """Reject an empty or infinite band."""
-        if not -math.inf < self.lo <= self.hi < math.inf:
+        are_numbers = isinstance(self.lo, Real) and isinstance(self.hi, Real)
+        if not (are_numbers and -math.inf < self.lo <= self.hi < math.inf):
             raise UserError(
-                f"A band must go from a finite number to a higher finite number, not from {self.lo} to "
-                f"{self.hi}. Compare the measure with one number (m > 90), or state a bound as an event "
+                f"A band must go from a finite number to a higher finite number, not from {self.lo!r} to "
+                f"{self.hi!r}. Compare the measure with one number (m > 90), or state a bound as an event "
                 "that stays()."
             )
         self.measure.require_seen(self.hi)
