@@ -51,6 +51,9 @@ def test_what_another_process_cannot_call_is_a_sentence() -> None:
             TrainingLoop(function, packages=())
     with pytest.raises(UserError, match=r"train does not take \(task, seed, budget\) and the settings speed: got"):
         TrainingLoop(train, {"speed": 1.0}, packages=())
+    for place in ("train", 3, "our_loops:"):
+        with pytest.raises(UserError, match="A training loop is a function, or its place such as"):
+            TrainingLoop(place, packages=())  # type: ignore[arg-type]
     with pytest.raises(UserError, match="settings=0.2 of a training loop is not a table of arguments by name"):
         TrainingLoop(train, 0.2, packages=())  # type: ignore[arg-type]
     with pytest.raises(UserError, match="TrainingLoop has deterministic='no'. Write True or False"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final, NoReturn
@@ -70,6 +71,10 @@ class TrainingLoop:
             place = reference(self.function)
             check_arguments(self.function, self.settings)
             object.__setattr__(self, "function", place)
+        if not re.fullmatch(r"[\w.]+:[\w.]+", self.place):
+            raise UserError(
+                f"A training loop is a function, or its place such as 'our_loops:train', not {self.function!r}."
+            )
         if not self.name:
             object.__setattr__(self, "name", self.place.rpartition(":")[2])
 
