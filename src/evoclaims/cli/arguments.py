@@ -71,8 +71,8 @@ def _running(add: _Add) -> None:
     plan.add_argument("--measure", action="store_true", help="time a few steps of conditions never run here")
 
     text = (
-        "run the missing trials that claims need, or of named conditions, and judge nothing; with --variant run what "
-        "it changes, and show which verdicts change"
+        "run the missing trials of what claims need, or of named conditions, and judge nothing; with --variant run "
+        "what it changes, and show which verdicts change"
     )
     run = add("run", text)
     run.add_argument("method", nargs="?", help="only this method")
@@ -89,7 +89,7 @@ def _running(add: _Add) -> None:
 
     submit = add(
         "submit",
-        "submit the missing batches that a tier's claims need, or of named conditions, as jobs of SLURM or of this "
+        "submit the missing batches of what a tier's claims need, or of named conditions, as jobs of SLURM or of this "
         "machine; a queued or running batch is left out",
     )
     submit.add_argument("method", nargs="?", help="only this method")

@@ -26,7 +26,7 @@ from evoclaims.trials.spec import Condition
 def choose(project: Project, options: argparse.Namespace) -> tuple[Tier, list[Names]]:
     """Return the tier that options name, and which of its conditions they select; of a variant, what it changes.
 
-    Without any name these are what the tier's claims need, and it is said how many others there are.
+    Without any name these are what the tier's claims need, and a line counts the others.
 
     Raises:
         UserError: for an unknown name, and for conditions that the variant leaves as they are; it lists the known ones.

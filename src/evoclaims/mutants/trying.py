@@ -42,16 +42,13 @@ class Comparison:
 
     def equivalent(self, names: Names, faulty: Condition, curves: Collection[str]) -> bool:
         """Whether every faulty trial ends as the sound one of its seed, and has the same of the `curves` that count."""
-        pairs = list(zip(self._trials(self._sound(names)), self._trials(faulty), strict=True))
-        return all(
-            a
-            and b
-            and (a.status, a.levels, a.metrics) == (b.status, b.levels, b.metrics)
-            and all(
-                repr(a.curves.get(name)) == repr(b.curves.get(name)) for name in curves
-            )  # NaN is not equal to itself
-            for a, b in pairs
-        )
+
+        def result(trial: TrialResult) -> object:
+            read = repr([trial.curves.get(name) for name in curves])  # a NaN is not equal to itself
+            return trial.status, trial.levels, trial.metrics, read
+
+        pairs = zip(self._trials(self._sound(names)), self._trials(faulty), strict=True)
+        return all(a and b and result(a) == result(b) for a, b in pairs)
 
     def drifted(self, names: Names, faulty: Condition) -> bool:
         """Whether faulty trials drift from the reference trials, at the drift check's strictest correction."""

@@ -69,7 +69,7 @@ def steps_to(source: Source, condition: Condition, curve: str, value: float, lev
 
 
 def _require_success(label: str, value: float) -> None:
-    """Reject a success that none can be: an event at it would never hold."""
+    """Reject a success outside 0 to 1: an event at it would never hold."""
     require_finite(f"{label}: a success's", value=value)
     if not 0.0 <= value <= 1.0:
         raise UserError(
