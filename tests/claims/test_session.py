@@ -559,10 +559,22 @@ def test_a_third_look_follows_the_first_two_and_is_another_design(session: Sessi
     session = replace(session, reproduction=replace(session.reproduction, tiers={**tiers, "full": full}))
     better, worse = _pair(session, "full")
     assertion = better.mean_success > worse.mean_success
-    two, three = (session.settle(ClaimTest(says, "full", "", third), assertion) for third in (False, True))
+    text = frozenset({""})
+    two, three = (session.settle(ClaimTest(says, "full", "", third), assertion) for third in (frozenset[str](), text))
     assert [(look.n, look.alpha) for look in three.attainable] == [(5, 0.01), (10, 0.04), (30, 0.0095)]
     assert [look.n for look in two.attainable] == [5, 10]
     assert (three.outcome, three.n, three.reason) == (two.outcome, two.n, two.reason)
     assert three.fingerprint != two.fingerprint
-    smoke = session.settle(ClaimTest(says, "smoke", "", True), _pair(session)[0].solves_every_level.in_most_trials())
+    smoke = session.settle(ClaimTest(says, "smoke", "", text), _pair(session)[0].solves_every_level.in_most_trials())
     assert [look.n for look in smoke.attainable] == [6]  # its α is spent
+
+
+def test_a_third_look_under_a_variant_is_named_by_its_mark(session: Session) -> None:
+    tiers = session.reproduction.tiers
+    tiers = {**tiers, "full": replace(tiers["full"], design=SEQUENTIAL)}
+    reproduction = replace(session.reproduction, tiers=tiers, variants={"longer": Variant("", {})})
+    for variant, looks in {"": {"": 3, "longer": 2}, "longer": {"": 2, "longer": 3}}.items():
+        judging = replace(session, reproduction=reproduction, variant=variant)
+        assert {name: len(judging.design("full", {name}).looks) for name in ("", "longer")} == looks
+    with pytest.raises(UserError, match="no variant with a third look named 'longest'.*longer"):
+        judging.design("full", {"longest"})

@@ -37,9 +37,10 @@ def test_plan_counts_the_trials_of_a_third_look_where_a_claim_is_open(evoclaims:
         "def test_{0}(trials, verdict):\n    verdict(trials('{0}', on='parity').solves_every_level.in_most_trials())\n"
     )
     third = "@third_look\n@says('{0}')\n" + body
+    under = third.replace("@third_look", "@third_look('traded')")  # a variant, not the protocol of the text
     project.write(
         "from evoclaims import third_look\n"
-        + "\n\n".join([third.format("right"), third.format("coin"), ("@says('{0}')\n" + body).format("wrong")])
+        + "\n\n".join([third.format("right"), third.format("coin"), under.format("wrong")])
     )
     status, out, err = evoclaims("plan")
     assert (status, err) == (0, "")

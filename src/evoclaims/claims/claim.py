@@ -28,7 +28,8 @@ _REPETITION: Final = re.compile(r"(^|-)run\d+of\d+(?=-|$)")
 third_look: Final = pytest.mark.claim_third_look
 """Mark of a claim, or of one `pytest.param(..., marks=...)` of it: thirty trials decide what ten leave open.
 
-Its α is paid for whichever claims have it, so that it may be chosen after ten trials (see `Design.with_third_look`).
+`third_look("submission")` is for the variant of this name instead of the protocol of the text. Its α is paid for
+whichever claims have it, so that it may be chosen after ten trials (see `Design.with_third_look`).
 """
 
 
@@ -273,13 +274,13 @@ class ClaimTest:
         claim: the paper's sentence.
         tier: "smoke" or "full".
         case: the ids of its parameters other than the tier, such as "n_parity"; empty without any.
-        third_look: whether thirty trials decide what ten leave open.
+        third_look: the variants under which thirty trials decide what ten leave open; "" is the protocol of the text.
     """
 
     claim: Claim
     tier: str
     case: str
-    third_look: bool = False
+    third_look: frozenset[str] = frozenset()
 
     @staticmethod
     def of(item: pytest.Item) -> ClaimTest:
@@ -301,7 +302,8 @@ class ClaimTest:
         case: str = callspec.id.removesuffix(tier_id(claim, tier)).removesuffix("-")
         if item.get_closest_marker("claim_repeated"):
             case = _REPETITION.sub("", case).removeprefix("-")
-        return ClaimTest(claim, tier, case, item.get_closest_marker("claim_third_look") is not None)
+        third = (name for mark in item.iter_markers("claim_third_look") for name in mark.args or ("",))
+        return ClaimTest(claim, tier, case, frozenset(third))
 
     @property
     def name(self) -> str:

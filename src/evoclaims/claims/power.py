@@ -118,6 +118,6 @@ class Pilots:
         without = [f"{' on '.join(names)} ({self._unfit[names]})" for names in one.groups if self._unfit[names]]
         if without:
             return ClaimPower(name, expected, None, f"no pilot of {', '.join(without)}")
-        design = self._design.with_third_look() if one.test.third_look else self._design
+        design = self._design.with_third_look() if "" in one.test.third_look else self._design
         looks = one.assertion.looks(design)
         return ClaimPower(name, expected, power(one.assertion, replace(self._design, looks=looks), draws, expected))

@@ -21,7 +21,7 @@ from evoclaims.claims.report_making import (
     report_of,
     without_trials,
 )
-from evoclaims.core.errors import UserError
+from evoclaims.core.errors import UserError, require_known
 from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.design import Design, Look
 from evoclaims.judging.judge import fetch_from
@@ -94,14 +94,21 @@ class Session:
         """Return the trials of a source from this session, whichever session has made the source."""
         return fetch_from(replace(source, get=self.fetch) if isinstance(source, TrialGroup) else source, seeds)
 
-    def design(self, tier: str, *, third_look: bool = False) -> Design:
+    def design(self, tier: str, third_look: Collection[str] = ()) -> Design:
         """Return a tier's design; with a fixed number of trials, it has one look with the whole α.
 
-        Variants have no third look: their trials are ten, and a verdict that these leave open would count as not run.
+        Args:
+            tier: "smoke" or "full".
+            third_look: the variants under which the claim has one (see `ClaimTest`).
+
+        Raises:
+            UnknownNameError: when there is no such variant.
         """
+        for name in filter(None, third_look):
+            require_known("variant with a third look", name, self.reproduction.variants)
         design = self.reproduction.tier(tier).design
         if self.trials is None:
-            return design.with_third_look() if third_look and not self.variant else design
+            return design.with_third_look() if self.variant in third_look else design
         return replace(design, looks=(Look(self.trials, design.alpha),))
 
     def settle(self, test: ClaimTest, assertion: Assertion, others: Sequence[Reading] = ()) -> ClaimReport:
@@ -109,7 +116,7 @@ class Session:
 
         A session that only reads trials judges `others`, too, the further readings of the sentence.
         """
-        design, claim = self.design(test.tier, third_look=test.third_look), test.claim
+        design, claim = self.design(test.tier, test.third_look), test.claim
         if self.leaves(test.tier, assertion):
             return without_trials(test, assertion, design, f"the variant {self.variant} changes none of its trials")
         report = report_of(test, assertion, design, self.trials_of, self.again)

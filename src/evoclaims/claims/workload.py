@@ -94,7 +94,7 @@ def workload(session: Session, tests: Mapping[pytest.Item, ClaimTest], platform:
     for item, test in once.values():
         claims[item.nodeid] = ()
         with suppress(Exception):  # an error of a method or a task is reported when the claim is judged
-            design = session.design(test.tier, third_look=test.third_look)
+            design = session.design(test.tier, test.third_look)
             needed = {group.fingerprint: group for group in _needed(session, recorder.call(item, test))}
             for condition, group in needed.items():
                 _ = group.condition.environment_steps
