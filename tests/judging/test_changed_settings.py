@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from evoclaims.judging.drift import MOST, changed_settings
@@ -33,6 +33,7 @@ def test_many_changes_are_counted() -> None:
 
 
 @given(SPECS, SPECS)
+@settings(max_examples=40)
 def test_nothing_is_named_exactly_where_nothing_differs(old: dict[str, Any], new: dict[str, Any]) -> None:
     assert (changed_settings(old, new) == "") == (repr(_sorted(old)) == repr(_sorted(new)))
 
