@@ -19,13 +19,6 @@ def _report(claim: str, outcome: Outcome, variant: str = "", tier: str = "smoke"
 PLAIN = [_report("A", Outcome.SUPPORTED), _report("B", Outcome.REFUTED), _report("C", Outcome.NOT_RUN)]
 
 
-def test_a_row_holds_what_each_variant_made_of_a_claim() -> None:
-    (row,) = matrix(PLAIN[:1], {"x": [_report("A", Outcome.REFUTED, "x")], "y": [_report("A", Outcome.SUPPORTED, "y")]})
-    assert (row.claim, row.tier, row.plain) == ("A", "smoke", Outcome.SUPPORTED)
-    assert row.outcomes == {"x": Outcome.REFUTED, "y": Outcome.SUPPORTED}
-    assert row.hangs_on == ("x",)
-
-
 def test_claims_that_no_variant_judged_are_left_out() -> None:
     variants = {"x": [_report("A", Outcome.NOT_RUN, "x"), _report("B", Outcome.REFUTED, "x")], "y": []}
     (row,) = matrix(PLAIN, variants)
