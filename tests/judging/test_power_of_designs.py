@@ -104,14 +104,6 @@ def test_about_so_many_trials_as_are_needed_suffice_and_one_fewer_do_not(source)
     assert exact(found.needed - 1) < 0.97
 
 
-def test_a_refutation_that_is_expected_counts_as_power(source) -> None:
-    a = source("a", [0.0] * 50)
-    solves = a.solved().in_most_trials()
-    found = power(solves, TEN, Draws(pilots(a)), Outcome.REFUTED)
-    assert (found.power, found.flips, found.needed) == (1.0, 0.0, 3)
-    assert (power(solves, TEN, Draws(pilots(a))).flips, power(solves, TEN, Draws(pilots(a))).power) == (1.0, 0.0)
-
-
 def test_no_number_of_trials_makes_a_claim_undecided(source) -> None:
     a = source("a", [1.0, 0.0] * 25)
     found = power(a.solved().in_most_trials(0.5), TEN, Draws(pilots(a)), Outcome.INCONCLUSIVE)

@@ -31,27 +31,19 @@ def trials(reproduction: Reproduction, made: Made) -> list[TrialResult]:
     return [made(condition, seed, seed / 4, "diverged" if seed == 3 else "done") for seed in (2, 0, 3, 1)]
 
 
-def test_reference_trials_lie_by_tier_method_and_task(path: Path, reproduction: Reproduction) -> None:
+def test_what_is_written_is_read_in_the_order_of_seeds(
+    path: Path, trials: list[TrialResult], reproduction: Reproduction
+) -> None:
     assert path == reproduction.folder / "reference" / "smoke" / "better-small.jsonl"
-
-
-def test_what_is_written_is_read_in_the_order_of_seeds(path: Path, trials: list[TrialResult]) -> None:
+    assert references.load(path) == ()
     references.write(path, trials)
+    before = path.read_bytes()
     back = references.load(path)
     assert [trial.seed for trial in back] == [0, 1, 2, 3]
     assert [*map(dump, back)] == [*map(dump, sorted(trials, key=lambda t: t.seed))]
-    assert len(path.read_text().splitlines()) == 4
-
-
-def test_writing_what_was_read_changes_no_byte(path: Path, trials: list[TrialResult]) -> None:
-    references.write(path, trials)
-    before = path.read_bytes()
-    references.write(path, references.load(path))
+    assert len(before.splitlines()) == 4
+    references.write(path, back)
     assert path.read_bytes() == before
-
-
-def test_a_condition_without_reference_trials_has_none(path: Path) -> None:
-    assert references.load(path) == ()
 
 
 @pytest.mark.parametrize(
