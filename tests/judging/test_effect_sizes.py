@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from evoclaims.judging.effect import a12, a12_interval, cliffs_delta, iqm, iqm_interval, median, median_interval
@@ -32,6 +32,7 @@ def test_the_median_ranks_infinities(data: list[float], middle: float) -> None:
 
 
 @given(values, values)
+@settings(max_examples=30)
 def test_the_interval_of_a12_lies_in_the_unit_interval_and_repeats(a: list[float], b: list[float]) -> None:
     low, high = a12_interval(a, b)
     assert 0 <= low <= high <= 1

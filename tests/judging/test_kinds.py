@@ -204,8 +204,7 @@ def test_exact_needs_every_trial_and_reports_no_p(source, last, outcome) -> None
     assert verdict.p is verdict.evidence[0].p is None
 
 
-@pytest.mark.parametrize("values", [RISING, [1.0] * 10, [0.0] * 5 + [9.0] * 5])
-@pytest.mark.parametrize("n", [6, 9, 10])
+@pytest.mark.parametrize(("n", "values"), [(6, RISING), (9, [1.0] * 10), (10, [0.0] * 5 + [9.0] * 5), (10, RISING)])
 def test_no_condition_is_above_itself(source, n, values) -> None:
     verdict = judge(source("a", values).score().never_above_itself(), Design.fixed(n))
     assert verdict.outcome is SUPPORTED
