@@ -74,7 +74,7 @@ def test_what_is_smaller_than_claimed_may_be_refuted_by_their_results(source) ->
 
 def test_a_decision_beside_copies_is_that_of_every_result(source) -> None:
     draw, decided = random.Random(1), 0
-    for _ in range(300):
+    for _ in range(100):
         a, b = [draw.gauss(1.3, 1) for _ in range(10)], [draw.gauss(0, 1) for _ in range(9)]
         a[1] = a[0]
 
