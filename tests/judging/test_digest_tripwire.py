@@ -12,8 +12,16 @@ CPU = {"platform": "cpu", "kind": "cpu", "count": 1}
 MADE_BY: dict[str, Any] = {"device": CPU, "machine": "x86_64", "versions": {"jax": "0.10.2"}}
 
 
-def test_a_digest_that_differs_is_named_by_its_seed(trial) -> None:
-    new = [trial(seed, 1.0, digest="new" if seed == 1 else "d", **MADE_BY) for seed in range(3)]
+@pytest.mark.parametrize(
+    "further",
+    [
+        {},
+        {"xla_flags": None, "x64": False, "prng": "threefry2x32"},  # which older records do not say
+        {"git": {"sha": "0" * 40, "dirty": True}},
+    ],
+)
+def test_a_digest_that_differs_is_named_by_its_seed(trial, further) -> None:
+    new = [trial(seed, 1.0, digest="new" if seed == 1 else "d", **MADE_BY, **further) for seed in range(3)]
     check = compare_digests(new, [trial(seed, 1.0, **MADE_BY) for seed in range(3)])
     assert (check.compared, check.changed) == (3, (DigestChange("condition", 1, "d", "new"),))
 
@@ -29,6 +37,9 @@ def test_a_digest_that_differs_is_named_by_its_seed(trial) -> None:
         (MADE_BY, {"machine": None}, 0, "condition"),
         (MADE_BY, {"versions": None}, 0, "condition"),
         (MADE_BY, {"instructions": "znver3 avx2"}, 0, "condition"),  # of which the other says nothing
+        (MADE_BY | {"xla_flags": None}, {"xla_flags": "--xla_cpu_enable_fast_math=true"}, 0, "condition"),
+        (MADE_BY | {"prng": "threefry2x32"}, {"prng": "rbg"}, 0, "condition"),
+        (MADE_BY | {"x64": False}, {"x64": True}, 0, "condition"),
         (MADE_BY | {"device": CPU | {"platform": "gpu"}}, {}, 0, "condition"),  # whose bits are not promised
         ({}, {}, 0, "condition"),  # how they were made is not said
         (MADE_BY, {}, 1, "condition"),
