@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from evoclaims.judging.effect import a12, a12_interval, cliffs_delta, iqm, iqm_interval, median, median_interval
@@ -15,10 +15,6 @@ values = st.lists(st.floats(-3, 3) | st.sampled_from([-math.inf, math.inf]), min
 
 def test_a12_counts_wins_and_half_the_ties() -> None:
     assert a12([1, 2, 3], [2, 2]) == pytest.approx((0 + 2 * 0.5 + 2) / 6)
-
-
-def test_cliffs_delta_is_one_when_everything_lies_above() -> None:
-    assert cliffs_delta([4, 5], [1, 2, 3]) == 1.0
 
 
 @given(values, values)
@@ -36,6 +32,7 @@ def test_the_median_ranks_infinities(data: list[float], middle: float) -> None:
 
 
 @given(values, values)
+@settings(max_examples=30)
 def test_the_interval_of_a12_lies_in_the_unit_interval_and_repeats(a: list[float], b: list[float]) -> None:
     low, high = a12_interval(a, b)
     assert 0 <= low <= high <= 1

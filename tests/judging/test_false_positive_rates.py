@@ -1,4 +1,4 @@
-"""No kind errs more often than alpha: 10,000 draws under the null at n = 3, 5, 10, ties included."""
+"""No kind errs more often than alpha: 10,000 draws under the null, ties included, or every outcome."""
 
 from __future__ import annotations
 
@@ -9,14 +9,13 @@ from itertools import combinations, combinations_with_replacement, product
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.stats import binom, norm
+from scipy.stats import binom
 
 from evoclaims.judging.assertion import AllOf, AnyOf, Compound
-from evoclaims.judging.exact import binomial_test, rank_test, sign_test
-from evoclaims.judging.kinds.greater import GreaterTests
+from evoclaims.judging.exact import binomial_test, rank_test
 from evoclaims.judging.kinds.threshold import sign_tests
 from evoclaims.judging.kinds.trend import kendall_s
-from evoclaims.judging.verdict import Outcome, PValues
+from evoclaims.judging.verdict import PValues
 
 DRAWS = 10_000
 Draw = Callable[[np.random.Generator, tuple[int, ...]], NDArray[np.float64]]
@@ -35,32 +34,14 @@ def assert_rate_at_most(alpha: float, errors: int) -> None:
 
 
 @pytest.mark.parametrize("null", NULLS)
-@pytest.mark.parametrize("n", [3, 5, 10])
-def test_greater_is_supported_no_more_often_than_alpha(n: int, null: str) -> None:
-    data = NULLS[null](np.random.default_rng(n), (DRAWS, 2, n)).tolist()
-    p = np.array([rank_test(a, b).p for a, b in data])
-    for alpha in (0.05, 0.04, 0.01):
-        assert_rate_at_most(alpha, int((p <= alpha).sum()))
-
-
-@pytest.mark.parametrize("null", NULLS)
 def test_two_looks_together_err_no_more_often_than_their_alphas(null: str) -> None:
     data = NULLS[null](np.random.default_rng(0), (DRAWS, 2, 10)).tolist()
     errors = sum(rank_test(a[:5], b[:5]).p <= 0.01 or rank_test(a, b).p <= 0.04 for a, b in data)
     assert_rate_at_most(0.05, errors)
 
 
-@pytest.mark.parametrize("n", [3, 5, 10])
-def test_an_effect_as_declared_is_refuted_no_more_often_than_alpha(n: int) -> None:
-    rng = np.random.default_rng(n)
-    # P(N(d, 1) > N(0, 1)) = 0.71 at d = 0.7826: the edge of the declared margin.
-    above, below = rng.normal(0.7826, 1, (DRAWS, n)).tolist(), rng.normal(0, 1, (DRAWS, n)).tolist()
-    outcomes = [GreaterTests(a, b, 0.71).p.outcome(0.05) for a, b in zip(above, below, strict=True)]
-    assert_rate_at_most(0.05, outcomes.count(Outcome.REFUTED))
-
-
-@pytest.mark.parametrize("null", [*NULLS, "half rise and half fall"])
-@pytest.mark.parametrize("n", [3, 5, 10])
+@pytest.mark.parametrize("null", ["three values", "half rise and half fall"])
+@pytest.mark.parametrize("n", [5, 10])
 def test_a_trend_is_supported_no_more_often_than_alpha(n: int, null: str) -> None:
     rng = np.random.default_rng(n)
     if null == "half rise and half fall":
@@ -71,20 +52,6 @@ def test_a_trend_is_supported_no_more_often_than_alpha(n: int, null: str) -> Non
     p = [sign_tests(sum(s < 0 for s in rows), sum(s > 0 for s in rows), n) for rows in slopes]
     assert_rate_at_most(0.05, sum(one.supported <= 0.05 for one in p))
     assert_rate_at_most(0.05, sum(one.refuted <= 0.05 for one in p))
-
-
-@pytest.mark.parametrize("n", [3, 5, 10])
-@pytest.mark.parametrize("alpha", [0.05, 0.04, 0.01])
-def test_solves_errs_no_more_often_than_alpha_either_way(n: int, alpha: float) -> None:
-    mass = binom.pmf(range(n + 1), n, 0.7)
-    assert sum(mass[k] for k in range(n + 1) if binomial_test(k, n, 0.7, "greater").p <= alpha) <= alpha
-    assert sum(mass[k] for k in range(n + 1) if binomial_test(k, n, 0.7, "less").p <= alpha) <= alpha
-
-
-@pytest.mark.parametrize("n", [3, 5, 10])
-def test_a_sign_test_errs_no_more_often_than_alpha(n: int) -> None:
-    mass = binom.pmf(range(n + 1), n, 0.5)
-    assert sum(mass[k] for k in range(n + 1) if sign_test(k, n).p <= 0.05) <= 0.05
 
 
 @pytest.mark.parametrize("compound", [AllOf, AnyOf])
@@ -112,14 +79,3 @@ def test_the_rank_test_is_exactly_valid_for_every_tie_pattern_of_four_against_fo
             rest = [pooled[i] for i in range(8) if i not in chosen]
             ps.append(rank_test([pooled[i] for i in chosen], rest).p)
         assert all(sum(other <= p for other in ps) / len(ps) <= p + 1e-12 for p in set(ps))
-
-
-@pytest.mark.parametrize(("effect", "power", "trials"), [(0.86, 0.92, 8.5), (0.98, 1.0, 5.6)])
-def test_the_sequential_design_has_the_specifications_power(effect: float, power: float, trials: float) -> None:
-    shift = float(norm.ppf(effect)) * 2**0.5
-    rng = np.random.default_rng(0)
-    above, below = rng.normal(shift, 1, (2000, 10)).tolist(), rng.normal(0, 1, (2000, 10)).tolist()
-    early = [rank_test(a[:5], b[:5]).p <= 0.01 for a, b in zip(above, below, strict=True)]
-    late = [rank_test(a, b).p <= 0.04 for a, b in zip(above, below, strict=True)]
-    assert np.mean(np.logical_or(early, late)) == pytest.approx(power, abs=0.02)
-    assert np.mean(np.where(early, 5, 10)) == pytest.approx(trials, abs=0.2)

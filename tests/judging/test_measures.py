@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 from dataclasses import replace
 
 import numpy as np
@@ -11,8 +12,10 @@ import pytest
 from evoclaims.core.errors import UserError
 from evoclaims.judging.design import Design
 from evoclaims.judging.kinds.greater import Greater
+from evoclaims.judging.kinds.threshold import Threshold
 from evoclaims.judging.measure import Event, Measure, Profile
 from evoclaims.judging.sample import UnreadableTrialError
+from evoclaims.judging.window import Window
 
 
 def fetched(source, n):  # type: ignore[no-untyped-def]
@@ -63,29 +66,9 @@ def test_two_units_are_not_compared_where_all_trials_have_failed(source) -> None
         (a > b).find(trials, Design.fixed(2), 0.05)
 
 
-def test_an_assertion_built_by_hand_refuses_two_units(source) -> None:
-    a, b = (replace(source(name, [1.0]).score(), unit=name) for name in "ab")
-    with pytest.raises(UserError, match="have different units"):
-        Greater(a, b)
-
-
 def test_a_failed_trial_is_flat_and_worst_in_a_profile(source) -> None:
     ppo = source("ppo", [(1.0, 0.5), "diverged"])
     assert ppo.success(2).rows(fetched(ppo, 2)) == ((1.0, 0.5), (-math.inf, -math.inf))
-
-
-def test_nan_in_a_finished_trial_is_an_error_for_every_kind_of_reading(source) -> None:
-    broken, row = source("ppo", [math.nan]), source("ppo", [(1.0, math.nan)])
-    hidden = Measure(broken, "made nan", lambda trial: math.nan)
-    ignored = Measure(broken, "clipped", lambda trial: max(0.0, trial.metrics["score"]))
-    for read in (broken.score(), broken.solved(), hidden, ignored):
-        with pytest.raises(UnreadableTrialError, match="NaN in the finished trial of seed 0"):
-            read.sample(fetched(broken, 1))
-    with pytest.raises(UnreadableTrialError, match="NaN"):
-        row.success(2).rows(fetched(row, 1))
-    computed = Profile(row, "computed", lambda trial: (0.0, math.nan), 2)
-    with pytest.raises(UnreadableTrialError, match="NaN"):
-        computed.rows(fetched(row, 1))
 
 
 def test_nan_in_a_curve_that_is_read_is_an_error(source) -> None:
@@ -99,41 +82,11 @@ def test_nan_in_a_curve_that_is_read_is_an_error(source) -> None:
     assert learnt.sample(fetched(broken, 1)).values == (1.0,)
 
 
-@pytest.mark.parametrize("given", [None, 1.0, "yes", (True,)])
-def test_an_event_that_is_neither_true_nor_false_is_an_error(source, given) -> None:
-    """A forgotten comparison would hold of every number but 0, and a forgotten return of none."""
-    ppo = source("ppo", [1.0])
-    with pytest.raises(UnreadableTrialError, match="'ppo: fast' is .* neither True nor False"):
-        Event(ppo, "fast", lambda trial: given).sample(fetched(ppo, 1))
-    assert Event(ppo, "fast", lambda trial: np.float32(1) > 0).sample(fetched(ppo, 1)).values == (1.0,)
-
-
-def test_a_misspelled_number_of_a_trial_is_an_error_that_lists_the_known_ones(source) -> None:
-    ppo = source("ppo", [1.0])
-    with pytest.raises(UnreadableTrialError, match="There is no 'scor' in the finished trial of seed 0") as error:
-        Measure(ppo, "misspelled", lambda trial: trial.metrics["scor"]).sample(fetched(ppo, 1))
-    assert str(error.value).endswith(". Did you mean 'score'? Known: score.")
-    assert Event(ppo, "optional", lambda trial: "scor" in trial.metrics).sample(fetched(ppo, 1)).values == (0.0,)
-
-
-def test_a_profile_of_another_length_is_an_error(source) -> None:
-    ppo = source("ppo", [(1.0, 0.5, 0.2)])
-    with pytest.raises(UnreadableTrialError, match="3 levels instead of 2"):
-        ppo.success(2).rows(fetched(ppo, 1))
-
-
 def test_a_level_of_a_profile_is_a_measure(source) -> None:
     ppo = source("ppo", [(1.0, 0.5)])
     at = ppo.success(2).at(1)
     assert at.describe() == "ppo: success at level 1"
     assert at.sample(fetched(ppo, 1)).values == (0.5,)
-    with pytest.raises(UserError, match="levels 0 to 1, not 2"):
-        ppo.success(2).at(2)
-
-
-def test_a_profile_of_one_level_is_rejected(source) -> None:
-    with pytest.raises(UserError, match="a profile needs at least 2"):
-        source("ppo", []).success(1)
 
 
 def test_assertions_read_as_sentences(source) -> None:
@@ -174,47 +127,6 @@ def test_no_assertion_is_true_or_false_without_a_judge(source) -> None:
         assert cma.score() > ppo.score() > cma.score()
 
 
-def test_measures_of_opposite_directions_are_not_compared(source) -> None:
-    with pytest.raises(UserError, match="one direction"):
-        _ = source("cma_es", []).score() > source("ppo", []).score("lower")
-
-
-def test_two_readings_of_the_same_trials_are_not_compared_by_rank(source) -> None:
-    success = source("cma_es", []).success(2)
-    with pytest.raises(UserError, match="same trials"):
-        _ = success.at(0) > success.at(1)
-    with pytest.raises(UserError, match="same trials"):
-        success.at(0).equivalent_to(success.at(1), margin=0.1)
-
-
-def test_an_unknown_direction_lists_the_known_ones(source) -> None:
-    with pytest.raises(UserError, match="higher, lower"):
-        source("cma_es", []).score("larger")
-
-
-@pytest.mark.parametrize("margin", [0.0, -1.0, math.inf, math.nan])
-def test_an_equivalence_needs_a_real_margin(source, margin) -> None:
-    with pytest.raises(UserError, match="margin"):
-        source("cma_es", []).score().equivalent_to(source("ppo", []).score(), margin=margin)
-
-
-@pytest.mark.parametrize("ends", [(2, 1), (-math.inf, 1), (0, math.inf), (math.nan, 1), ("a", 1)])
-def test_a_band_needs_two_finite_ends_in_order(source, ends) -> None:
-    with pytest.raises(UserError, match="band"):
-        source("cma_es", []).score().between(*ends)
-
-
-@pytest.mark.parametrize("p0", [0.0, 1.0])
-def test_an_overriding_p0_lies_between_0_and_1(source, p0) -> None:
-    with pytest.raises(UserError, match="p0"):
-        source("cma_es", []).solved().in_most_trials(p0)
-
-
-def test_only_assertions_are_joined(source) -> None:
-    with pytest.raises(UserError, match="parentheses"):
-        _ = source("cma_es", []).solved().stays() & 3
-
-
 def test_compounds_are_flat_and_name_each_condition_once(source) -> None:
     a, b, c = (source(name, []).solved().stays() for name in "abc")
     assert (a | b | c).parts == (a | (b | c)).parts == (a, b, c)
@@ -230,15 +142,107 @@ def test_a_profile_above_another_is_above_at_every_level_beyond(source) -> None:
     assert high.above(low, beyond=2).plain() == parts[2].plain()
 
 
-@pytest.mark.parametrize(("size", "beyond"), [(3, 0), (4, 3), (4, -1)])
-def test_profiles_are_compared_at_levels_that_both_have(source, size, beyond) -> None:
-    with pytest.raises(UserError, match="cannot be compared"):
-        source("cma_es", []).success(4).above(source("ppo", []).success(size), beyond=beyond)
+def with_unit(measure: Measure, unit: str) -> Measure:
+    return replace(measure, unit=unit)
 
 
-@pytest.mark.parametrize("answer", [None, [1.0, 2.0], "much"])
-def test_a_measure_that_reads_no_number_is_a_sentence_with_its_name(source, answer) -> None:
-    a = source("a", [1.0])
-    odd = Measure(a, "odd", lambda trial: answer)
-    with pytest.raises(UnreadableTrialError, match="odd is .*, and no number, in the finished trial of seed 0"):
-        odd.sample(fetched(a, 1))
+def within(measure: Measure, limit: float, every: float = 0.0) -> Measure:
+    return measure.seen_through(Window(limit, every))
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda a, b: a.score() > b.score("lower"), "one direction"),
+        (lambda a, b: a.score("larger"), "higher, lower"),
+        (lambda a, b: a.success(2).at(0) > a.success(2).at(1), "same trials"),
+        (lambda a, b: a.success(2).at(0).equivalent_to(a.success(2).at(1), margin=0.1), "same trials"),
+        (lambda a, b: Greater(with_unit(a.score(), "m"), with_unit(b.score(), "km")), "have different units"),
+        (lambda a, b: Greater(within(a.score(), 100.0), within(b.score(), 50.0)), "not observed up to the same limit"),
+        (
+            lambda a, b: within(a.score(), 100.0, 20.0) > within(b.score(), 100.0, 25.0),
+            "multiples of 20 and 25 up to 100",
+        ),
+        (lambda a, b: within(a.score(), 100.0, 20.0) > within(b.score(), 10.0), "with reports equally far apart"),
+        *(
+            (lambda a, b, margin=margin: a.score().equivalent_to(b.score(), margin=margin), "margin")
+            for margin in (0.0, -1.0, math.inf, math.nan)
+        ),
+        *(
+            (lambda a, b, ends=ends: a.score().between(*ends), "band")
+            for ends in ((2, 1), (-math.inf, 1), (0, math.inf), (math.nan, 1), ("a", 1))
+        ),
+        *((lambda a, b, p0=p0: a.solved().in_most_trials(p0), "p0") for p0 in (0.0, 1.0)),
+        *((lambda a, b, x=x: a.score() > x, "finite number") for x in (math.inf, -math.inf, math.nan)),
+        (lambda a, b: a.score() > True, r"is compared with True\. Use another measure"),
+        (lambda a, b: a.score() < "90", r"is compared with '90'\. Use another measure or a number"),
+        *(
+            (lambda a, b, it=it: it(a.score(), 90), "by > or <, and not by >= or <=")
+            for it in (operator.ge, operator.le)
+        ),
+        (lambda a, b: a.score() >= b.score(), "'a: score' is compared by > or <"),
+        (lambda a, b: Threshold(a.score(), "over", 1.0), "above, below"),
+        *(
+            (lambda a, b, factor=factor: a.score() * factor, "is multiplied by .* Use a finite number above 0")
+            for factor in (0, -1, math.inf, math.nan, True, "2")
+        ),
+        (lambda a, b: a.solved().stays() & 3, "parentheses"),
+        (lambda a, b: a.success(1), "a profile needs at least 2"),
+        (lambda a, b: a.success(2).at(2), "levels 0 to 1, not 2"),
+        (lambda a, b: a.success(4).above(b.success(3), beyond=0), "cannot be compared"),
+        *((lambda a, b, x=x: a.success(4).above(b.success(4), beyond=x), "cannot be compared") for x in (3, -1)),
+    ],
+)
+def test_what_cannot_be_asserted_is_a_sentence(source, make, said) -> None:
+    with pytest.raises(UserError, match=said):
+        make(source("a", []), source("b", []))
+
+
+def test_numbers_of_numpy_are_numbers(source) -> None:
+    score = source("a", []).score()
+    assert (score > np.float32(2)).plain() == (score > 2).plain() == (2 < score).plain()  # noqa: SIM300
+
+
+@pytest.mark.parametrize(
+    ("value", "reading", "said"),
+    [
+        (math.nan, lambda a: a.score(), "'score' is NaN in the finished trial of seed 0"),
+        (math.nan, lambda a: a.solved(), "'score' is NaN in the finished trial of seed 0"),
+        (math.nan, lambda a: Measure(a, "clipped", lambda t: max(0.0, t.metrics["score"])), "'score' is NaN"),
+        (
+            1.0,
+            lambda a: Measure(a, "made nan", lambda t: math.nan),
+            "a: made nan is NaN in the finished trial of seed",
+        ),
+        ((1.0, math.nan), lambda a: a.success(2), "'success' is NaN"),
+        ((1.0, 2.0), lambda a: Profile(a, "computed", lambda t: (0.0, math.nan), 2), "a: computed is NaN"),
+        ((1.0, 0.5, 0.2), lambda a: a.success(2), "3 levels instead of 2"),
+        (
+            1.0,
+            lambda a: Measure(a, "misspelled", lambda t: t.metrics["scor"]),
+            r"no 'scor' in the finished trial of seed 0 .*\. Did you mean 'score'\? Known: score\.$",
+        ),
+        *(  # a forgotten comparison would hold of every number but 0, and a forgotten return of none
+            (1.0, lambda a, given=given: Event(a, "fast", lambda t: given), "'a: fast' is .* neither True nor False")
+            for given in (None, 1.0, "yes", (True,))
+        ),
+        *(
+            (
+                1.0,
+                lambda a, it=it: Measure(a, "odd", lambda t: it),
+                "odd is .*, and no number, in the finished trial",
+            )
+            for it in (None, [1.0, 2.0], "much")
+        ),
+    ],
+)
+def test_what_cannot_be_read_of_a_finished_trial_is_an_error(source, value, reading, said) -> None:
+    read = reading(source("a", [value]))
+    with pytest.raises(UnreadableTrialError, match=said):
+        (read.rows if isinstance(read, Profile) else read.sample)(fetched(read.source, 1))
+
+
+def test_an_event_may_ask_whether_there_is_a_number_and_may_be_a_boolean_of_numpy(source) -> None:
+    ppo = source("ppo", [1.0])
+    for holds, value in ((lambda trial: "scor" in trial.metrics, 0.0), (lambda trial: np.float32(1) > 0, 1.0)):
+        assert Event(ppo, "optional", holds).sample(fetched(ppo, 1)).values == (value,)

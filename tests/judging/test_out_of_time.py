@@ -72,11 +72,10 @@ def test_what_is_smaller_than_claimed_may_be_refuted_by_their_results(source) ->
     assert ends == [Outcome.SMALLER, REFUTED, INCONCLUSIVE]
 
 
-@pytest.mark.parametrize("better", [1.3, 1.0])
-def test_a_decision_beside_copies_is_that_of_every_result(source, better: float) -> None:
+def test_a_decision_beside_copies_is_that_of_every_result(source) -> None:
     draw, decided = random.Random(1), 0
-    for _ in range(300):
-        a, b = [draw.gauss(better, 1) for _ in range(10)], [draw.gauss(0, 1) for _ in range(9)]
+    for _ in range(100):
+        a, b = [draw.gauss(1.3, 1) for _ in range(10)], [draw.gauss(0, 1) for _ in range(9)]
         a[1] = a[0]
 
         def ends(last: object, a: list[float] = a, b: list[float] = b) -> Outcome:
@@ -113,7 +112,3 @@ def test_a_later_look_may_decide_what_an_early_one_left_to_them(source) -> None:
     design = Design((Look(5, 0.01), Look(10, 0.04)))
     verdict = judge(source("a", ["timeout", *[0.0] * 9]).solved().in_most_trials(), design)
     assert (verdict.outcome, verdict.n) == (REFUTED, 10)
-
-
-def test_diverged_trials_are_results_of_a_method_and_keep_the_worst_rank(source) -> None:
-    assert judge(source("a", ["diverged"] * 10).score() > source("b", LOW).score(), FIXED_10).outcome is REFUTED

@@ -80,25 +80,6 @@ def test_a_repetition_of_trials_all_at_the_end_of_the_scale_is_seldom_outside(pr
     assert (prediction.of, prediction.low, prediction.high) == ("trials at 1", 7.0, 10.0)
 
 
-@given(mean=values, error=spreads, ours=several, factor=st.sampled_from([0.25, 2.0, 1024.0]))
-def test_another_unit_changes_no_answer(mean: float, error: float, ours: list[float], factor: float) -> None:
-    here = repetition(PublishedMean(mean, error, 10), ours, 10)
-    there = repetition(PublishedMean(mean * factor, error * factor, 10), [x * factor for x in ours], 10)
-    ends = [(prediction.low * factor, prediction.high * factor) for prediction in here.predictions]
-    assert ends == [(prediction.low, prediction.high) for prediction in there.predictions]
-    assert here.answer == there.answer
-
-
-@given(mean=values, error=spreads, ours=several)
-def test_an_interval_has_the_mean_in_its_middle_and_is_wider_for_a_standard_error(
-    mean: float, error: float, ours: list[float]
-) -> None:
-    found = repetition(PublishedMean(mean, error, 10), ours, 10)
-    narrow, wide = _of(found, Spread.DEVIATION), _of(found, Spread.STANDARD_ERROR)
-    assert (narrow.low + narrow.high) / 2 == pytest.approx(mean, abs=1e-9)
-    assert wide.high - wide.low == pytest.approx(math.sqrt(10) * (narrow.high - narrow.low))
-
-
 @given(mean=values, error=spreads, ours=several)
 def test_a_planted_shift_is_outside(mean: float, error: float, ours: list[float]) -> None:
     """By the bar's width times ten, under both readings; unshifted, the same spread of values is inside."""
@@ -163,8 +144,7 @@ def _agreement(mean: float, ours: list[float], trials: int = 10, error: float | 
     return found.agreement
 
 
-@pytest.mark.parametrize("true", [0.0, 0.4, detectable_shift(10)])
-@pytest.mark.parametrize("n", [10, 50])
+@pytest.mark.parametrize(("true", "n"), [(0.0, 10), (detectable_shift(10), 10), (detectable_shift(10), 50)])
 def test_a_mean_at_the_margin_is_seldom_found_consistent(true: float, n: int) -> None:
     """At the margin at most 5 of 100, by the reading that is true; ten trials of ours never suffice."""
     rng = np.random.default_rng(40)
@@ -173,8 +153,7 @@ def test_a_mean_at_the_margin_is_seldom_found_consistent(true: float, n: int) ->
         found = repetition(PublishedMean(float(theirs.mean()), statistics.stdev(theirs), 10), [*map(float, ours)], 10)
         needed = _of(found, Spread.DEVIATION).needed
         consistent += needed is not None and needed <= n
-    share = consistent / DRAWN
-    assert share == 0 if n == 10 else share <= (0.06 if true == detectable_shift(10) else 1.0)
+    assert consistent / DRAWN <= (0 if n == 10 else 0.06)
 
 
 def test_the_trials_that_would_show_equivalence_just_do() -> None:

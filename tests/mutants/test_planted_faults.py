@@ -35,6 +35,7 @@ def condition(method: Any = CMA_ES, task: Any = PARITY) -> Condition:
     return Condition(method, task, "curriculum", Budget(generations=3))
 
 
+SOUND = {("a", "b"): condition()}
 RIGHT: PolicyFn = HandBuilt().best(PARITY, jnp.int32(0))
 
 
@@ -178,14 +179,10 @@ def test_the_step_size_stays_what_it_was() -> None:
 
 
 @pytest.mark.parametrize(
-    "name", [name for name, mutant in MUTANTS.items() if mutant.targets({("a", "b"): condition()})]
+    "name", ["pays-at-random", *(name for name, one in MUTANTS.items() if one.part == "method" and one.targets(SOUND))]
 )
 def test_the_engine_runs_a_mutant_as_any_other_condition(name: str) -> None:
-    (faulty,) = (
-        MUTANTS[name]
-        .conditions({("a", "b"): condition()}, MUTANTS[name].targets({("a", "b"): condition()})[0])
-        .values()
-    )
+    (faulty,) = MUTANTS[name].conditions(SOUND, MUTANTS[name].targets(SOUND)[0]).values()
     program = Program(faulty)
 
     def whole(seed: Any) -> Any:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import jax
@@ -133,12 +135,6 @@ def test_methods_have_the_parameters_that_their_faults_say() -> None:
     assert ("hyperneat", "obstacles") not in EVERY["hyperneat: substrate-in-a-point"].conditions  # it has layers
 
 
-class _Reproduction:
-    """Stands for a reproduction that names a module of mutants."""
-
-    name, folder, mutants = "tiny", REPRODUCTION.folder, "its_mutants"
-
-
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -153,9 +149,10 @@ class _Reproduction:
     ],
 )
 def test_a_module_without_mutants_is_one_sentence(
-    text: str, said: str, pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+    text: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    pytester.makepyfile(its_mutants=text)
-    monkeypatch.syspath_prepend(pytester.path)
+    name = f"mutants_of_{tmp_path.name}"
+    (tmp_path / f"{name}.py").write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(UserError, match=said):
-        mutant.load(_Reproduction())  # type: ignore[arg-type]
+        mutant.load(SimpleNamespace(name="tiny", folder=tmp_path, mutants=name))  # type: ignore[arg-type]

@@ -69,17 +69,6 @@ def test_what_is_judged_is_stored_unless_a_committed_trial_goes_before_it(
     assert [archive.stored(trial, here) is not None for trial in ids] == [True, False, False, True, False, False]
 
 
-def test_a_torn_file_of_reference_trials_is_said(
-    tmp_path: Path, store: Store, made: Any, reproduction: Reproduction
-) -> None:
-    condition = reproduction.tier("smoke").condition("better", "small")
-    path = references.path_of(tmp_path, "smoke", "better", "small")
-    references.write(path, [made(condition, 0, 1.0)])
-    path.write_bytes(path.read_bytes()[:-20])
-    with pytest.raises(UserError, match="is not a reference trial"):
-        Archive(store, tmp_path).trials(condition, [0])
-
-
 def test_an_edited_line_is_an_error_of_who_reads_it_and_a_line_that_is_no_trials_of_everyone(
     tmp_path: Path, store: Store, made: Any, reproduction: Reproduction
 ) -> None:

@@ -27,32 +27,12 @@ class Searcher(RandomSearch):
     name: ClassVar[str] = "searcher"
 
 
-@dataclass(frozen=True)
-class Copied(RandomSearch):
-    """Another one, copied from it with its name."""
-
-    name: ClassVar[str] = "searcher"
-
-
-@dataclass(frozen=True)
-class Posing(RandomSearch):
-    """One with the name of the package's own."""
-
-    name: ClassVar[str] = "random_search"
-
-
-@dataclass(frozen=True)
-class Named(RandomSearch):
-    """One with a name of its own."""
-
-    name: ClassVar[str] = "named"
-
-
-@dataclass(frozen=True)
-class OtherParity(NParity):
-    """A task with the name of another."""
-
-    name: ClassVar[str] = "n_parity"
+# Another one, copied from it with its name; one with the name of the package's own; and one with a name of its own.
+Copied, Posing, Named = (
+    dataclass(frozen=True)(type(name, (RandomSearch,), {"name": of, "__module__": __name__}))
+    for name, of in (("Copied", "searcher"), ("Posing", "random_search"), ("Named", "named"))
+)
+OtherParity = type("OtherParity", (NParity,), {"name": "n_parity", "__module__": __name__})
 
 
 def _condition(method: Any, task: Any = NParity(3)) -> Condition:  # noqa: B008

@@ -170,17 +170,6 @@ def test_only_trials_of_a_kind_of_device_count_where_one_is_named(owed: Callable
     assert (named.cost.basis, other.cost.basis) == ("here", "budget")
 
 
-def test_the_files_of_a_name_are_read_once_for_all_its_conditions(
-    monkeypatch: pytest.MonkeyPatch, reproduction: Reproduction, store: Store
-) -> None:
-    read: list[tuple[str, str, str]] = []
-    monkeypatch.setattr(references, "committed", lambda folder, *names: read.append(names) or ())
-    many = {bits: Wanted(("better", "small"), replace(CONDITION, task=NParity(bits)), range(4)) for bits in (2, 3, 4)}
-    Estimator(store, reproduction, "full", "cpu").owed(many)
-    assert sorted(set(read)) == [("full", "better", "small"), ("smoke", "better", "small")]
-    assert len(read) == 3  # of the tier itself, and of all
-
-
 def test_a_file_of_committed_trials_that_cannot_be_read_says_nothing(reproduction: Reproduction, store: Store) -> None:
     path = references.path_of(reproduction.references, "full", "better", "small")
     path.parent.mkdir(parents=True)

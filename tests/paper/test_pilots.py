@@ -16,6 +16,7 @@ from evoclaims.paper import pilots
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.paper.trial_group import TrialGroup
 from evoclaims.trials.result import TrialResult
+from reproductions.nisioti2025 import REPRODUCTION
 
 SIX = Design.fixed(6)
 
@@ -134,3 +135,19 @@ def test_new_trials_are_compared_with_those_of_both_pilots(
     assert pilots.not_second(later, trials) == ""
     assert pilots.not_second([*later, trials[0]], trials) == "it has seeds of the first pilot (102)"
     assert pilots.both(path.parents[2], "smoke", "better", "small", "f" * 64) == ()
+
+
+COMMITTED = sorted(
+    path for name in ("pilot", "second_pilot") for path in (REPRODUCTION.folder / name / "smoke").iterdir()
+)
+
+
+@pytest.mark.parametrize("path", COMMITTED, ids=["-".join((path.parts[-3], path.stem)) for path in COMMITTED])
+def test_a_committed_pilot_has_fifty_other_seeds_of_todays_condition(path: Path) -> None:
+    trials, tier = pilots.load(path), REPRODUCTION.tier("smoke")
+    method, _, task = path.stem.partition("-")
+    second = path.parts[-3] == "second_pilot"
+    assert pilots.path_of(REPRODUCTION.folder, "smoke", method, task, second=second) == path
+    assert {trial.condition for trial in trials} == {tier.condition(method, task).id}
+    assert {trial.seed for trial in trials} == {*range(150, 200)} if second else {*range(100, 150)}
+    assert not {trial.seed for trial in trials} & {*tier.design.seeds(tier.design.last.n)}

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from evoclaims.core.errors import UnknownNameError, UserError
-from evoclaims.paper.reported import Reported, load_published
+from evoclaims.paper.reported import SENTENCES_FILE, Reported, Uncovered, load_published, uncovered
 
 SOUND = """
 [plots.maze.reward]
@@ -83,3 +83,19 @@ def test_what_is_not_published_is_nothing(tmp_path: Path) -> None:
 def test_a_number_without_its_place_or_a_torn_plot_is_refused(tmp_path: Path, text: str, what: str) -> None:
     with pytest.raises(UserError, match=f"entries that are not as expected: {what}"):
         load_published(_write(tmp_path, text))
+
+
+ONE = '[[sentence]]\nline = {}\nsays = "a"\nbecause = "b"\n'
+
+
+def test_sentences_without_a_claim_are_read_in_the_papers_order(tmp_path: Path) -> None:
+    assert uncovered(tmp_path) == ()
+    (tmp_path / SENTENCES_FILE).write_text(ONE.format(9) + ONE.format(3))
+    assert uncovered(tmp_path) == (Uncovered(3, "a", "b"), Uncovered(9, "a", "b"))
+
+
+@pytest.mark.parametrize("text", ["[[sentence", "[[sentence]]\nline = 3\n", ONE.format('"x"'), "sentence = 3\n"])
+def test_a_file_that_holds_no_sentences_is_refused(tmp_path: Path, text: str) -> None:
+    (tmp_path / SENTENCES_FILE).write_text(text)
+    with pytest.raises(UserError, match=r"Cannot read .*sentences.toml: .* with line \(a number\), says and because"):
+        uncovered(tmp_path)

@@ -36,26 +36,6 @@ def _read(what: Measure | Event, group: TrialGroup, n: int = 3) -> tuple[float, 
     return what.sample({group.fingerprint: tuple(group.fetch(range(n)))}).values
 
 
-def test_a_group_is_named_as_the_claim_asked_for_it(group: Any) -> None:
-    made = group(lambda seed: 1.0)
-    assert (made.label, made.fingerprint) == ("better on small", made.condition.id)
-
-
-def test_an_attribute_that_a_property_lacks_is_not_taken_for_a_measure() -> None:
-    without_id: Any = object()
-    with pytest.raises(AttributeError, match="'object' object has no attribute 'id'"):
-        _ = TrialGroup("better", "small", without_id, without_id).fingerprint
-
-
-def test_no_trial_is_fetched_before_a_verdict_needs_it(reproduction: Reproduction) -> None:
-    def refuse(*asked: Any) -> Any:
-        raise AssertionError("fetched")
-
-    made = TrialGroup("better", "small", reproduction.tier("smoke").condition("better", "small"), refuse)
-    assert made.mean_success.between(0.0, 1.0).describe()
-    assert made.solves_every_level.in_most_trials().describe()
-
-
 @pytest.mark.parametrize(
     ("name", "values"),
     [
@@ -106,12 +86,6 @@ def test_each_event_holds_where_its_name_says(group: Any, event: Any, held: tupl
 def test_what_would_always_hold_or_never_is_refused(group: Any, event: Any, said: str) -> None:
     with pytest.raises(UserError, match=said):
         event(group(lambda seed: 1.0))
-
-
-def test_the_success_of_a_level_can_be_compared_with_another(group: Any) -> None:
-    made = group(lambda seed: seed / 2)
-    assert made.success.size == 2
-    assert _read(made.success.at(1), made) == (0.0, 0.5, 1.0)
 
 
 def test_measures_and_events_have_names_of_their_own_since_fingerprints_hash_them(group: Any) -> None:

@@ -1,7 +1,7 @@
-"""A small library in ten releases, as wheels, and a paper about a network that is built from it.
+"""A small library in six releases, as wheels, and a paper about a network that is built from it.
 
-Release 1.3 makes the network's outputs larger, which changes fitness and no success; from 1.6 on they are negated, so
-that it solves nothing. 1.5 asks for what nobody has, so that it cannot be installed.
+Release 1.2 makes the network's outputs larger, which changes fitness and no success; from 1.4 on they are negated, so
+that it solves nothing. 1.3 asks for what nobody has, so that it cannot be installed.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from typing import Final
 
 from wheels import write_wheel
 
-RELEASES: Final = tuple(f"1.{minor}" for minor in range(10))
-LARGER, UNINSTALLABLE, NEGATED = "1.3", "1.5", "1.6"
+RELEASES: Final = tuple(f"1.{minor}" for minor in range(6))
+LARGER, UNINSTALLABLE, NEGATED = "1.2", "1.3", "1.4"
 
 PAPER: Final = '''
 from dataclasses import dataclass

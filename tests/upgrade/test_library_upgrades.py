@@ -45,8 +45,8 @@ def full(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The project with a full store."""
     folder = _laboratory(tmp_path_factory.mktemp("full") / "laboratory")
     ran = _run(folder)
-    assert "5 deselected" in ran.stdout, ran.stdout + ran.stderr
-    assert len(Store(folder / ".evoclaims").ids()) == 5 * N
+    assert "3 deselected" in ran.stdout, ran.stdout + ran.stderr
+    assert len(Store(folder / ".evoclaims").ids()) == 3 * N
     return folder
 
 

@@ -80,13 +80,6 @@ def test_the_hash_of_the_trials_follows_from_their_digests(store: Store, judged:
     assert len(hashes) == 2
 
 
-def test_a_first_verdict_is_accepted_and_the_same_one_not_again(store: Store, judged: Report) -> None:
-    report = judged(_provenance())
-    history, accepted, _ = _accept(store, {}, report)
-    assert accepted == ("G1 (smoke): supported, the first verdict",)
-    assert _accept(store, history, report) == (history, (), ())
-
-
 @pytest.mark.parametrize(
     ("provenance", "fields", "said"),
     [
@@ -141,9 +134,3 @@ def test_what_says_nothing_of_a_claim_is_never_accepted(store: Store, judged: Re
     assert left == (
         f"G1 (smoke) is {outcome} now (10 trials\\x1b are missing): it stays supported, accepted on 2025-11-02",
     )
-
-
-def test_a_claim_that_broke_before_it_was_judged_is_left_alone(store: Store, judged: Report) -> None:
-    _, accepted, left = _accept(store, {}, judged(outcome=Outcome.ERROR, verdict=None, sources=()))
-    assert accepted == ()
-    assert left == ("G1 (smoke) is error now (so): nothing is accepted",)

@@ -7,7 +7,7 @@ from math import ceil, log2
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoclaims.cli.bisect import Change, bisect
+from evoclaims.cli.bisect import bisect
 
 
 @st.composite
@@ -36,14 +36,3 @@ def test_the_change_lies_between_the_two_that_are_told_with_only_unknown_members
     assert len(asked) == len(set(asked))
     assert {0, length - 1}.isdisjoint(asked)
     assert len(asked) - len(unknown.intersection(asked)) <= (ceil(log2(length - 1)) if not unknown else length - 2)
-
-
-def test_one_of_a_thousand_releases_takes_ten_questions() -> None:
-    asked: list[int] = []
-
-    def has_changed(index: int) -> bool:
-        asked.append(index)
-        return index >= 700
-
-    assert bisect(1001, has_changed) == Change(699, 700)
-    assert len(asked) <= 10

@@ -1,6 +1,9 @@
-"""Verdicts then and now: each claim of either side is said once, and only what can be compared counts as a change."""
+"""Verdicts then and now, and under variants: each claim is said once, and only what can be compared is a change."""
 
 from __future__ import annotations
+
+from dataclasses import replace
+from itertools import permutations
 
 import pytest
 from hand_made_verdicts import report, verdict
@@ -8,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evoclaims.core.errors import UserError
-from evoclaims.judging.verdict import Outcome
+from evoclaims.judging.verdict import Outcome, Verdict
+from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.transitions import (
     Kind,
     Standing,
@@ -17,6 +21,7 @@ from evoclaims.verdicts.transitions import (
     counts,
     describe,
     matched,
+    matrix,
     parse_patterns,
     standings,
 )
@@ -36,51 +41,45 @@ def _one(old: Standing | None, new: Standing | None) -> Transition:
 
 
 @given(STANDINGS, STANDINGS)
-def test_every_claim_of_either_side_has_exactly_one_transition(
-    old: dict[tuple[str, str], Standing], new: dict[tuple[str, str], Standing]
-) -> None:
-    found = compare(old, new)
-    assert sorted((one.tier, one.claim) for one in found) == sorted(old.keys() | new.keys())
-    for one in found:
-        assert (one.old, one.new) == (old.get((one.tier, one.claim)), new.get((one.tier, one.claim)))
-        assert describe(one).isprintable()
-
-
-@given(STANDINGS)
-def test_verdicts_have_not_changed_against_themselves(verdicts: dict[tuple[str, str], Standing]) -> None:
-    assert {one.kind for one in compare(verdicts, verdicts)} <= {Kind.SAME, Kind.NOT_RUN}
-
-
-@given(STANDINGS, STANDINGS)
-def test_what_changed_one_way_changes_back_the_other_way(
+def test_every_claim_of_either_side_has_exactly_one_transition_which_goes_back_the_other_way(
     old: dict[tuple[str, str], Standing], new: dict[tuple[str, str], Standing]
 ) -> None:
     there, back = compare(old, new), compare(new, old)
+    assert sorted((one.tier, one.claim) for one in there) == sorted(old.keys() | new.keys())
+    for one in there:
+        assert (one.old, one.new) == (old.get((one.tier, one.claim)), new.get((one.tier, one.claim)))
     for kind in (Kind.SAME, Kind.CHANGED, Kind.NEW_HISTORY):
         assert [one.claim for one in there if one.kind is kind] == [one.claim for one in back if one.kind is kind]
+    assert {one.kind for one in compare(old, old)} <= {Kind.SAME, Kind.NOT_RUN}
 
 
-@given(OUTCOMES, OUTCOMES, OUTCOMES, OUTCOMES)
-def test_a_pattern_matches_its_own_change_and_no_other(a: Outcome, b: Outcome, c: Outcome, d: Outcome) -> None:
-    if a == b:
-        return
-    transition = _one(Standing(c, "f"), Standing(d, "f"))
-    found = matched([transition], parse_patterns(f"{a}->{b}"))
-    assert bool(found) == ((a, b) == (c, d))
-
-
-@given(OUTCOMES, OUTCOMES)
-def test_a_star_stands_for_every_outcome_of_a_verdict_that_changed(old: Outcome, new: Outcome) -> None:
+@pytest.mark.parametrize("old", Outcome)
+@pytest.mark.parametrize("new", Outcome)
+def test_a_pattern_matches_its_own_change_a_star_every_one_and_neither_a_new_history(
+    old: Outcome, new: Outcome
+) -> None:
     transition = _one(Standing(old, "f"), Standing(new, "f"))
-    for pattern in (f"*->{new}", f"{old}->*", "*->*"):
-        assert bool(matched([transition], parse_patterns(pattern))) == (old != new)
-
-
-@given(OUTCOMES, OUTCOMES)
-def test_verdicts_under_other_rules_are_not_compared(old: Outcome, new: Outcome) -> None:
+    for a, b in permutations(Outcome, 2):
+        found = [
+            bool(matched([transition], parse_patterns(f"{one}->{other}"))) for one in (a, "*") for other in (b, "*")
+        ]
+        changed = old != new
+        assert found == [(a, b) == (old, new), changed and a == old, changed and b == new, changed]
     transition = _one(Standing(old, "a" * 64), Standing(new, "b" * 64))
     assert transition.kind is Kind.NEW_HISTORY or old == new == Outcome.NOT_RUN
     assert matched([transition], EVERY) == ()
+
+
+def test_several_patterns_are_parted_by_commas() -> None:
+    text = " supported -> refuted, *->error ,not run->*,"
+    assert parse_patterns(text) == parse_patterns("supported->refuted,*->error,not run->*")
+    assert len(parse_patterns(text)) == 3
+
+
+@given(st.text(max_size=20), st.text(max_size=20), st.sampled_from(Kind))
+def test_no_name_can_steer_the_terminal(tier: str, claim: str, kind: Kind) -> None:
+    old, new = Standing(Outcome.SUPPORTED, "f"), Standing(Outcome.REFUTED, "f")
+    assert describe(Transition(tier, claim, kind, old, new)).isprintable()
 
 
 def test_a_new_history_says_so_with_both_fingerprints_and_verdicts() -> None:
@@ -110,12 +109,6 @@ def test_a_claim_never_run_is_neither_new_nor_changed() -> None:
     assert _one(Standing(Outcome.SUPPORTED, "f"), waiting).kind is Kind.CHANGED
 
 
-def test_several_patterns_are_parted_by_commas() -> None:
-    text = " supported -> refuted, *->error ,not run->*,"
-    assert parse_patterns(text) == parse_patterns("supported->refuted,*->error,not run->*")
-    assert len(parse_patterns(text)) == 3
-
-
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -131,13 +124,6 @@ def test_a_pattern_that_cannot_match_is_one_sentence(text: str, said: str) -> No
         parse_patterns(text)
 
 
-@given(st.text(max_size=20), st.text(max_size=20))
-def test_no_name_can_steer_the_terminal(tier: str, claim: str) -> None:
-    for kind, new in ((Kind.CHANGED, Outcome.REFUTED), (Kind.SAME, Outcome.SUPPORTED)):
-        old = Standing(Outcome.SUPPORTED, "f")
-        assert describe(Transition(tier, claim, kind, old, Standing(new, "f"))).isprintable()
-
-
 def test_a_report_stands_under_its_name_with_its_fingerprint() -> None:
     judged = report("G1", "refuted", case="a", verdict=verdict("refuted", fingerprint="f1"))
     broken = report("G2", "error", tier="full", verdict=None)
@@ -145,3 +131,46 @@ def test_a_report_stands_under_its_name_with_its_fingerprint() -> None:
         ("smoke", "G1[a]"): Standing(Outcome.REFUTED, "f1"),
         ("full", "G2"): Standing(Outcome.ERROR, ""),
     }
+
+
+def _report(claim: str, outcome: Outcome, variant: str = "", tier: str = "smoke") -> ClaimReport:
+    return report(claim, outcome, tier=tier, variant=variant)
+
+
+PLAIN = [_report("A", Outcome.SUPPORTED), _report("B", Outcome.REFUTED), _report("C", Outcome.NOT_RUN)]
+
+
+def test_claims_that_no_variant_judged_are_left_out() -> None:
+    variants = {"x": [_report("A", Outcome.NOT_RUN, "x"), _report("B", Outcome.REFUTED, "x")], "y": []}
+    (row,) = matrix(PLAIN, variants)
+    assert (row.claim, row.outcomes, row.hangs_on) == ("B", {"x": Outcome.REFUTED}, ())
+
+
+@pytest.mark.parametrize("plain", Outcome)
+@pytest.mark.parametrize("varied", [outcome for outcome in Outcome if outcome is not Outcome.NOT_RUN])
+def test_a_claim_hangs_on_a_variant_where_both_have_run_and_their_verdicts_differ(
+    plain: Outcome, varied: Outcome
+) -> None:
+    (row,) = matrix([_report("A", plain)], {"x": [_report("A", varied, "x")]})
+    assert (row.plain, row.outcomes) == (plain, {"x": varied})
+    assert row.hangs_on == (("x",) if plain is not Outcome.NOT_RUN and plain is not varied else ())
+
+
+def test_tiers_are_kept_apart() -> None:
+    assert matrix(PLAIN[:1], {"x": [_report("A", Outcome.REFUTED, "x", tier="full")]}) == ()
+
+
+def test_a_variant_that_is_inconclusive_with_fewer_trials_says_nothing_of_the_detail() -> None:
+    """The protocol itself was inconclusive at ten trials, before thirty decided."""
+
+    def judged(outcome: Outcome, n: int) -> ClaimReport:
+        report = _report("A", outcome)
+        return replace(report, verdict=Verdict(outcome, "", "", "f", n=n))
+
+    undecided, refuted = judged(Outcome.INCONCLUSIVE, 10), judged(Outcome.REFUTED, 10)
+    (row,) = matrix([judged(Outcome.SUPPORTED, 30)], {"x": [undecided], "y": [refuted]})
+    assert (row.hangs_on, row.fewer) == (("y",), {"x"})
+    (row,) = matrix([judged(Outcome.SUPPORTED, 10)], {"x": [undecided]})
+    assert row.hangs_on == ("x",)
+    (row,) = matrix([judged(Outcome.INCONCLUSIVE, 30)], {"x": [undecided]})
+    assert (row.hangs_on, row.fewer) == ((), frozenset())

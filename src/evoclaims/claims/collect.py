@@ -75,11 +75,6 @@ def collect(config: SuiteConfig, asked: Asked) -> list[list[Collected]]:
     if run.troubles:
         rest = f", and {len(run.troubles) - 1} more such errors" if len(run.troubles) > 1 else ""
         raise UserError(f"The claims in {run.claims} cannot be collected: {run.troubles[0]}{rest}.")
-    if not run.has_claims:
-        raise UserError(
-            f"No claim found in {run.claims}: claims are in files {run.files}, on functions {run.functions}, each with "
-            "@claim(...)."
-        )
     run.check_complete()
     return [recorder.found for recorder, _ in asked]
 
@@ -193,18 +188,18 @@ class _Run:
                 renew(item)
         return True
 
-    @property
-    def has_claims(self) -> bool:
-        """Whether any claim was collected."""
-        return bool(claim_tests(self._collected))
-
     def check_complete(self) -> None:
-        """Raise if claims were collected but have no report.
+        """Raise if no claims were collected, or some that have no report.
 
         Raises:
-            UserError: when there are such claims.
+            UserError: when that is so.
         """
         tests = {item.nodeid: test for item, test in claim_tests(self._collected).items()}
+        if not tests:
+            raise UserError(
+                f"No claim found in {self.claims}: claims are in files {self.files}, on functions {self.functions}, "
+                "each with @claim(...)."
+            )
         for recorder, tier in ((recorder, tier) for recorder, tiers in self._asked for tier in tiers):
             called = {one.test.key for one in recorder.found}
             wanted = {name: test for name, test in tests.items() if test.tier == tier}
@@ -229,7 +224,6 @@ def _same(recorder: Recorder, before: Iterable[list[Collected]]) -> list[Collect
 
 
 def _sentence(error: BaseException, root: Path) -> str:
-    """Return in one line what kept claims from being collected."""
     if isinstance(error, pytest.Collector.CollectError | pytest.UsageError | pytest.fail.Exception):
         cause = error.__cause__
         if isinstance(cause, ImportError | SyntaxError) and cause.msg:  # pytest's message is their traceback

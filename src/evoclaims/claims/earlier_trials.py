@@ -202,7 +202,6 @@ def _alike(old: Mapping[str, Any], new: Mapping[str, Any]) -> int:
 
 
 def _settings(now: Mapping[str, Condition], before: Sequence[Sequence[TrialResult]]) -> str:
-    """Return the settings of each side that differ."""
     changed = {
         label: changed_settings(trials[0].spec, condition.plain)
         for (label, condition), trials in zip(now.items(), before, strict=True)

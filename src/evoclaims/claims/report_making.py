@@ -170,7 +170,6 @@ def _source(
     assertion: Assertion,
     seeds: Sequence[int],
 ) -> SourceTrials:
-    """Describe one condition of a report."""
     condition = group.condition
     readings = [reading for reading in assertion.readings() if reading.source.fingerprint == group.fingerprint]
     finished = [trial for trial in trials if trial.status == "done"]

@@ -127,7 +127,6 @@ def _works(
     needs: Mapping[str, _Need],
     platform: str,
 ) -> dict[str, Work]:
-    """Look up what is known of conditions of a tier."""
     wanted: dict[str, Wanted] = {}
     for name, need in needs.items():
         group, seeds = need.group, sorted(need.seeds)

@@ -43,7 +43,6 @@ def iqm(values: Sequence[float]) -> float:
 
 
 def _iqm(values: Floats) -> Floats:
-    """Return the interquartile means of the last axis."""
     from scipy.stats import trim_mean  # its import takes longer than the collection of claims, which needs this module
 
     with np.errstate(invalid="ignore"):

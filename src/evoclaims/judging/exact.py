@@ -17,18 +17,13 @@ MAX_TRIALS = 100
 """Maximum trials per side for the exact counts (about a second at 100 against 100)."""
 
 
-def digit_width(total: int) -> int:
-    """Return the bits per digit for counts that add up to `total`."""
-    return total.bit_length() + 1
-
-
 @dataclass(frozen=True)
 class Counts:
     """How many of equally likely cases have X = 0, 1, 2, ...
 
     Attributes:
         packed: the counts, `width` bits each.
-        width: see `digit_width`.
+        width: one more bit than their sum has.
         total: number of cases.
     """
 
@@ -120,7 +115,7 @@ def _splits_by_doubled_u(n: int, ties: tuple[int, ...]) -> Counts:
     """
     m = sum(ties) - n
     total = math.comb(n + m, n)
-    width = digit_width(total)
+    width = total.bit_length() + 1
     # Digit u of ways[i]: the number of ways to give A i of the values so far, with 2U = u.
     ways = {0: 1}
     below = 0

@@ -79,7 +79,6 @@ def p_by_blocks(conditions: Sequence[Columns], count: int) -> float:
 
 
 def _share_of(wide: bool, blocks: int) -> float:
-    """Return the share of α that a block of measures has."""
     return 1.0 if blocks == 1 else IN_PILOTS if wide else 1 - IN_PILOTS
 
 

@@ -112,7 +112,7 @@ def judge(
         p_refuted=p_of(Direction.AGAINST, finding.p.refuted),
         attainable_p_refuted=finding.attainable.refuted if tested else None,
         evidence=finding.evidence,
-        without_result=_without_result(assertion, ending.trials),
+        without_result=_ended(assertion, ending.trials, "diverged", "timeout"),
         overspent=overspent(assertion, ending.trials)[0],
         copies=ending.copies,
         deciding=finding.deciding(outcome.direction),
@@ -239,15 +239,15 @@ def _shortage(assertion: Assertion, look: Look) -> str:
 def _crashed(assertion: Assertion, trials: Trials) -> str:
     """Return a sentence that names the crashed trials, or nothing; equal messages of a condition are named once."""
     sentences = []
-    for mark, label in {source.fingerprint: source.label for source in assertion.sources()}.items():
-        crashed = [trial for trial in trials[mark] if trial.status == "crashed"]
-        if crashed:
+    for source in assertion.sources():
+        mine = trials[source.fingerprint]
+        if crashed := [trial for trial in mine if trial.status == "crashed"]:
             seeds = ", ".join(trial.seed_in_words for trial in crashed)
             reasons = list(dict.fromkeys(filter(None, map(why, crashed))))
             first = f": {'the first: ' * (len(reasons) > 1)}{reasons[0]}{place(crashed)}" if reasons else ""
             plural = "s" * (len(crashed) > 1)
             sentences.append(
-                f"{len(crashed)} of {len(trials[mark])} trials of {label} crashed (seed{plural} {seeds}){first}"
+                f"{len(crashed)} of {len(mine)} trials of {source.label} crashed (seed{plural} {seeds}){first}"
             )
     return "; ".join(sentences)
 
@@ -285,19 +285,15 @@ def _counted_once(assertion: Assertion, design: Design, look: Look, trials: Tria
     return Ending(agreed, counted, found.trials, finding, what, found.sentence, look.n - found.kept)
 
 
-def _without_result(assertion: Assertion, trials: Trials) -> str:
-    """Return a clause that names the trials which diverged or ran out of time, or nothing."""
-    return _ended(assertion, trials, "diverged", "timeout")
-
-
 def _ended(assertion: Assertion, trials: Trials, *statuses: str) -> str:
     """Return a clause that names the trials which ended so, or nothing."""
     words = {"diverged": "diverged", "timeout": "ran out of time"}
     found = [
-        f"{len(seeds)} of {len(trials[mark])} trials of {label} {words[status]} (seeds {', '.join(seeds)})"
-        for mark, label in {source.fingerprint: source.label for source in assertion.sources()}.items()
+        f"{len(seeds)} of {len(mine)} trials of {source.label} {words[status]} (seeds {', '.join(seeds)})"
+        for source in assertion.sources()
+        for mine in [trials[source.fingerprint]]
         for status in statuses
-        if (seeds := [trial.seed_in_words for trial in trials[mark] if trial.status == status])
+        if (seeds := [trial.seed_in_words for trial in mine if trial.status == status])
     ]
     return "; ".join(found)
 
@@ -371,7 +367,6 @@ def _tied(finding: Finding) -> str:
 
 
 def _needs(assertion: Assertion, design: Design) -> str:
-    """Say how many trials support would take."""
     needed = needed_trials(assertion, design)
     if needed is None:
         return f"no n up to {MAX_TRIALS} suffices at alpha = {design.last.alpha:g}"

@@ -229,7 +229,6 @@ def _mean(
 
 @lru_cache
 def _t(level: float, freedom: int) -> float:
-    """Return a quantile of Student's t."""
     from scipy.stats import t as student  # as in `judging.exact`
 
     return float(student.ppf(level, freedom))

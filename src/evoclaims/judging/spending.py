@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.sample import Trials
@@ -17,33 +16,16 @@ ALLOWED: Final = 1.0
 """Share of a budget beyond which claims are errors, unless a training loop's `overspend` says another."""
 
 
-@dataclass(frozen=True)
-class Spending:
-    """What a trial has spent.
-
-    Attributes:
-        spent, budget: in `unit`.
-        unit: "environment steps" or "generations".
-        allowed: most that it may spend.
-    """
+class _Spending(NamedTuple):
+    """What a trial has spent of its budget, in environment steps or generations, and the most that it may spend."""
 
     spent: float
     budget: int
     unit: str
     allowed: float
 
-    @property
-    def share(self) -> float:
-        """What it spent, in budgets."""
-        return self.spent / self.budget
 
-    @property
-    def in_words(self) -> str:
-        """Such as "53,995 of 40,000 environment steps"."""
-        return f"{self.spent:,.0f} of {self.budget:,} {self.unit}"
-
-
-def spending(trial: TrialResult) -> Spending | None:
+def _spending(trial: TrialResult) -> _Spending | None:
     """Return what a trial has spent; None for one without a budget, such as an imported one, or that does not say."""
     budget, method = trial.spec.get("budget"), trial.spec.get("method")
     if not isinstance(budget, Mapping):
@@ -58,22 +40,23 @@ def spending(trial: TrialResult) -> Spending | None:
     parameters: Any = method.get("parameters") if isinstance(method, Mapping) else None
     share = parameters.get("overspend", ALLOWED) if isinstance(parameters, Mapping) else ALLOWED
     allowed = share if isinstance(share, int | float) and not isinstance(share, bool) else ALLOWED
-    return Spending(max(spent), most, "environment steps" if steps else "generations", most * (1 + allowed))
+    return _Spending(max(spent), most, "environment steps" if steps else "generations", most * (1 + allowed))
 
 
 def overspent(assertion: Assertion, trials: Trials) -> tuple[str, str]:
     """Return a line on conditions whose trials overspent, and a sentence that refuses one; both empty without any."""
     lines, refusal = [], ""
     for source in assertion.sources():
-        found = [(trial, spent) for trial in trials[source.fingerprint] if (spent := spending(trial)) is not None]
-        over = [(trial, spent) for trial, spent in found if spent.share > 1 + TOLERATED]
+        found = [(trial, spent) for trial in trials[source.fingerprint] if (spent := _spending(trial)) is not None]
+        over = [(trial, spent) for trial, spent in found if spent.spent / spent.budget > 1 + TOLERATED]
         if not over:
             continue
-        trial, worst = max(over, key=lambda one: one[1].share)
-        lines.append(f"{len(over)} of {len(found)} trials of {source.label} spent up to {worst.in_words}")
+        trial, worst = max(over, key=lambda one: one[1].spent / one[1].budget)
+        in_words = f"{worst.spent:,.0f} of {worst.budget:,} {worst.unit}"  # "53,995 of 40,000 environment steps"
+        lines.append(f"{len(over)} of {len(found)} trials of {source.label} spent up to {in_words}")
         if worst.spent > worst.allowed and not refusal:
             refusal = (
-                f"{source.label} spent {worst.in_words} (seed {trial.seed_in_words}), and at most {worst.allowed:,.0f} "
+                f"{source.label} spent {in_words} (seed {trial.seed_in_words}), and at most {worst.allowed:,.0f} "
                 "are allowed: end training within the budget, raise the budget (of a method in steps, to a multiple of "
                 "its cost), or declare a larger overspend= of the training loop"
             )

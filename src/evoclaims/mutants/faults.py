@@ -107,7 +107,6 @@ class FaultyTask(Fault):
         return self._settled(self.sound.examine(self._between(policy), key, self.asked(level)), key)
 
     def _between(self, policy: PolicyFn) -> PolicyFn:
-        """Return the policy as the sound task calls it."""
         return lambda observation: self.done(fitting(self.sound, policy(self.seen(observation))))
 
     def _settled(self, episode: Episode, key: PRNGKeyArray) -> Episode:

@@ -68,7 +68,6 @@ class Comparison:
         return self.reproduction.tier(self.tier).condition(*names)
 
     def _trials(self, condition: Condition) -> tuple[TrialResult | None, ...]:
-        """Return the trials of the last look."""
         design = self.reproduction.tier(self.tier).design
         return self.archive.trials(condition, design.seeds(design.last.n))
 
@@ -125,7 +124,6 @@ def noticed(
 
 
 def _curves(report: ClaimReport, names: Names) -> tuple[str, ...]:
-    """Return the curves that a claim reads of a condition's trials."""
     reads = {read for source in report.sources if (source.method, source.task) == names for read in source.reads}
     return tuple(sorted(read.removeprefix("curves.") for read in reads if read.startswith("curves.")))
 

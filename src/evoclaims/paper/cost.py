@@ -202,7 +202,6 @@ class Estimator:
         return ()
 
     def _is_fitting(self, trial: TrialResult) -> bool:
-        """Whether a trial was made on such a device."""
         device = trial.device
         return device.get("platform") == self.platform and self.kind in ("", device.get("kind"))
 

@@ -99,7 +99,6 @@ def load_published(path: Path) -> Published:
 
 
 def _wrong_plots(plots: Any) -> Iterator[str]:
-    """Yield the names of entries among the plots that are not plots."""
     for task, found in plots.items() if isinstance(plots, dict) else [("plots", plots)]:
         if isinstance(found, dict):
             yield from (f"{task}.{name}" for name, plot in found.items() if not _is_plot(plot))
@@ -108,7 +107,6 @@ def _wrong_plots(plots: Any) -> Iterator[str]:
 
 
 def _wrong_tables(tables: Any) -> Iterator[str]:
-    """Yield the names of entries among the tables that are not tables."""
     for name, table in tables.items() if isinstance(tables, dict) else [("tables", tables)]:
         if not (isinstance(table, dict) and table.get("place") and table.get("values")):
             yield name

@@ -155,7 +155,6 @@ def _flat(name: str, value: Any) -> dict[str, Any]:
 
 
 def _cell(value: Any) -> Any:
-    """Return a value as a cell of comma-separated values."""
     if isinstance(value, list | tuple | dict):
         return json.dumps(as_plain(value))
     if not isinstance(value, str):

@@ -139,7 +139,6 @@ def predecessors(records: Sequence[TrialResult], packages: tuple[str, ...]) -> t
 
 
 def _line(one: Succession) -> str:
-    """Describe what changed for one condition."""
     ran = f"{one.again} trials run again" if one.again else "run again before"
     pairs = one.pairs
     if not pairs:

@@ -258,12 +258,12 @@ class Watch:
 
     def alarms(self, nights: Sequence[Night]) -> dict[str, list[str]]:
         """Return the families whose evidence has reached the level in a series, with lines on each."""
-        return {one.label: _alarm(one, nights, at) for one in self.families if (at := self._first(one, nights)) >= 0}
-
-    def _first(self, family: Family, nights: Sequence[Night]) -> int:
-        """Return the index of the first night with an alarm; -1 without one."""
-        reached = [night.evidence[family.label] >= self.level for night in nights]
-        return reached.index(True) if True in reached else -1
+        found = {}
+        for one in self.families:
+            reached = [night.evidence[one.label] >= self.level for night in nights]
+            if True in reached:
+                found[one.label] = _alarm(one, nights, reached.index(True))
+        return found
 
 
 def _alarm(family: Family, nights: Sequence[Night], at: int) -> list[str]:
@@ -322,7 +322,6 @@ def _scores(conditions: Sequence[Watched], nights: Sequence[Night]) -> tuple[Flo
 
 
 def _of_column(one: Watched, measure: str, nights: Sequence[Night]) -> Floats:
-    """Return the evidence of one measure after each night."""
     if not one.constant(measure):
         name = f"{one.label}: {measure}"
         return _by_ranks(name, len(one.values[measure]), nights, lambda until: _ranks(_column(one, measure, until)))

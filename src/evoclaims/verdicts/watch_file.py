@@ -107,7 +107,6 @@ def load(path: Path) -> tuple[bytes, tuple[Night, ...]]:
 
 
 def _nights(plain: dict[str, Any]) -> Iterator[Night]:
-    """Yield the nights, each checked."""
     if plain.keys() != {"schema", "night"}:
         raise ValueError("it has other entries than nights")
     seal = ""
@@ -138,7 +137,6 @@ def append(path: Path, before: bytes, night: Night) -> None:
 
 
 def _seal(before: str, night: Night) -> str:
-    """Return the hash of a night and of the seal before it."""
     return content_hash([before, to_builtins(night)])
 
 

@@ -68,7 +68,6 @@ class MostTrials(Assertion):
         return design.p0 if self.p0 is None else self.p0
 
     def _p(self, k: int, n: int, design: Design) -> PValues:
-        """Return the binomial p of `k` successes in `n`, for and against."""
         p0 = self._null(design)
         return PValues(binomial_test(k, n, p0, "greater").p, binomial_test(k, n, p0, "less").p)
 

@@ -77,7 +77,6 @@ class SelfComparison(Assertion):
 
 
 def _halves(n: int) -> Iterator[tuple[int, ...]]:
-    """Yield the indices of one half of each split."""
     if math.comb(n, n // 2) <= MOST_SPLITS:
         yield from combinations(range(n), n // 2)
         return

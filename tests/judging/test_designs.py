@@ -1,8 +1,9 @@
-"""The margin of a comparison is the effect that the paper's own design detects with power 1/3."""
+"""Designs: impossible ones are rejected; the margin is the effect that the paper's own detects with power 1/3."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from itertools import permutations
 
 import numpy as np
@@ -10,8 +11,15 @@ import pytest
 from scipy.stats import mannwhitneyu, norm
 
 from evoclaims.core.errors import UserError
-from evoclaims.judging.design import FIXED_10, SEQUENTIAL, _u_distribution, comparison_power, detectable_a12
-from evoclaims.judging.judge import fingerprint
+from evoclaims.judging.design import (
+    FIXED_10,
+    SEQUENTIAL,
+    Design,
+    Look,
+    _u_distribution,
+    comparison_power,
+    detectable_a12,
+)
 
 
 def test_ten_against_ten_give_the_margin_of_all_committed_fingerprints() -> None:
@@ -50,11 +58,6 @@ def test_larger_designs_detect_less_and_too_small_ones_nothing() -> None:
         FIXED_10.for_paper(3)
 
 
-def test_a_paper_with_other_trials_has_other_fingerprints(source) -> None:
-    claim = source("a", []).score() > source("b", []).score()
-    assert fingerprint(claim, SEQUENTIAL.for_paper(20)) != fingerprint(claim, SEQUENTIAL.for_paper(10))
-
-
 def test_the_power_of_a_comparison_is_that_of_its_closed_form_and_of_normal_trials() -> None:
     odds = 0.8 / 0.2  # all three of A above all of B: each time the largest left is one of A
     assert comparison_power(3, 0.05, 0.8) == pytest.approx(math.prod(i * odds / (i * odds + 3) for i in (3, 2, 1)))
@@ -63,3 +66,34 @@ def test_the_power_of_a_comparison_is_that_of_its_closed_form_and_of_normal_tria
     a, b = rng.normal(2**0.5 * norm.ppf(0.8), 1, (4000, 10)), rng.normal(0, 1, (4000, 10))
     found = (mannwhitneyu(a, b, axis=1, method="exact", alternative="greater").pvalue <= 0.04).mean()
     assert comparison_power(10, 0.04, 0.8) == pytest.approx(found, abs=0.05)
+
+
+def test_the_presets_are_the_specifications() -> None:
+    assert FIXED_10.looks == (Look(10, 0.05),)
+    assert SEQUENTIAL.looks == (Look(5, 0.01), Look(10, 0.04))
+    assert SEQUENTIAL.alpha == pytest.approx(0.05)
+    assert (FIXED_10.p0, FIXED_10.a12_margin, FIXED_10.seeds(3)) == (0.7, 0.71, (0, 1, 2))
+
+
+def test_a_fixed_design_looks_once() -> None:
+    assert Design.fixed(7).looks == (Look(7, 0.05),)
+
+
+@pytest.mark.parametrize(
+    ("make", "sentence"),
+    [
+        (lambda: Look(0, 0.05), "1 to 100 trials"),
+        (lambda: Look(101, 0.05), "1 to 100 trials"),
+        (lambda: Look(10, 0.0), "alpha"),
+        (lambda: Look(10, 1.0), "alpha"),
+        (lambda: Design(()), "at least one look"),
+        (lambda: Design((Look(5, 0.01), Look(5, 0.04))), "more than the one before"),
+        (lambda: Design((Look(5, 0.5), Look(6, 0.5))), "add up to 1. Their sum must be below 1"),
+        (lambda: Design((Look(5, 0.05),), p0=1.0), "p0"),
+        (lambda: Design((Look(5, 0.05),), a12_margin=0.4), "A12 margin"),
+        (lambda: Design((Look(5, 0.05),), first_seed=-1), "first seed is -1. It must be at least 0"),
+    ],
+)
+def test_an_impossible_design_is_rejected_in_a_sentence(make: Callable[[], object], sentence: str) -> None:
+    with pytest.raises(UserError, match=sentence):
+        make()
