@@ -86,7 +86,6 @@ def test_a_users_mistake_is_one_sentence(evoclaims: Evoclaims, stored: Store) ->
     for arguments, said in (
         (("--mutant=blnd",), "There is no mutant named 'blnd'. Did you mean 'blind'?"),
         (("--of=neat",), "There is no method or task named 'neat'."),
-        (("--tier=ful",), "There is no tier named 'ful'."),
     ):
         status, _, err = evoclaims("mutants", *arguments)
         assert (status, err.count("\n")) == (2, 1)

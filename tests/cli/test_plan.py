@@ -115,6 +115,7 @@ def test_a_method_whose_steps_cannot_be_timed_is_named_and_the_others_are_planne
     assert re.search(r"^right on parity +0 +10 +4\d +\d+ s$", out, re.MULTILINE)
     assert re.search(r"^d +10 +0.05 ", out, re.MULTILINE)
     assert "--measure times a few steps" not in out
+    assert not Path(".evoclaims/trials").exists()
 
 
 def test_a_task_that_is_refused_is_refused_when_it_is_planned(

@@ -154,7 +154,6 @@ def test_a_condition_that_breaks_does_not_stop_the_others(piloted: Evoclaims, pr
         (("--stored", "--trials=101"), "to 100 trials per condition, not 101."),
         (("--run", "--first-seed=2147483647"), "A seed is a whole number from 0 to 2147483647"),
         (("--draws=0",), "--draws takes a number from 1 up, not 0."),
-        (("--tier=ful",), "There is no tier named 'ful'."),
     ],
 )
 def test_a_mistake_is_a_sentence(evoclaims: Evoclaims, arguments: tuple[str, ...], said: str) -> None:

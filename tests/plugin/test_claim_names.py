@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from evoclaims.cli import main
-from evoclaims.judging.verdict import Outcome
 from evoclaims.verdicts import history
 
 Sentence = Callable[[pytest.RunResult, str], None]
@@ -47,19 +45,6 @@ def test_claims_whose_parameters_are_called_alike_keep_their_own_verdicts(
     assert main(["accept", "--tier=smoke"]) == 1
     accepted = history.load(project.path / "verdicts.toml")
     assert sorted(entries[-1].outcome for entries in accepted.values()) == ["refuted", "supported"]
-
-
-def test_a_refutation_is_not_missed_behind_a_parameter_of_nearly_the_same_name(project: Any) -> None:
-    project.write(PAIR.format("a-smoke", "a"))
-    project.run()
-    assert main(["accept", "--tier=smoke", f"--storage={project.store}"]) == 1
-    path = project.path / "verdicts.toml"
-    kept = history.load(path)
-    refuted = ("smoke", "G1[a-smoke]")
-    path.write_text(history.dump({**kept, refuted: (replace(kept[refuted][0], outcome=Outcome.SUPPORTED),)}))
-    result = project.run("--claims-compare-fail=supported->refuted")
-    assert result.ret == 1
-    result.stdout.fnmatch_lines(["REGRESSION G1?a-smoke? (smoke): supported -> refuted*"])
 
 
 SAME = "@says('G1')\ndef test_{0}(trials, verdict):\n    verdict(trials('{0}', on='parity').mean_success > 0)\n"
@@ -131,14 +116,6 @@ def test_a_claim_without_parameters_shares_its_id_with_no_cases_of_another_test(
     sentence(result, "claims/test_claims.py::test_cases[right-X1-smoke] with some. So X1 would name")
     project.write(BESIDE.format("X2"))  # two sentences under one id, each with its own cases
     assert project.run("--collect-only").ret == 0
-
-
-def test_the_command_line_refuses_two_claims_of_one_name_too(project: Any, capsys: pytest.CaptureFixture[str]) -> None:
-    project.write(IN_THE_ID)
-    for command in ("status", "accept"):
-        assert main([command, "--tier=smoke"]) == 2
-        assert "Two claim tests at the smoke tier are called G1[a]" in capsys.readouterr().err
-    assert not (project.path / "verdicts.toml").exists()
 
 
 CLASS = """

@@ -157,13 +157,6 @@ def test_parameters_multiply_with_tiers_and_name_the_case(project: Any) -> None:
     }
 
 
-def test_a_claim_that_takes_no_verdict_is_a_sentence(project: Any, sentence: Sentence) -> None:
-    project.write("@says('a')\ndef test_a():\n    pass\n")
-    result = project.run()
-    assert result.ret == pytest.ExitCode.INTERRUPTED
-    sentence(result, "test_a is a claim but takes neither the fixture `trials` nor `verdict`.")
-
-
 def test_the_fixtures_are_refused_to_tests_that_are_no_claims(project: Any) -> None:
     project.write("def test_a(trials):\n    pass\n")
     result = project.run()
@@ -205,13 +198,6 @@ def test_claims_in_a_file_that_pytest_takes_for_none_of_tests_are_a_sentence(pro
     sentence(result, "more.py has a test with @claim(...), and pytest takes no file of this name for one of tests")
 
 
-def test_a_claim_without_a_text_is_a_sentence_at_collection(project: Any) -> None:
-    project.write("@claim('a', says='x', where='', smoke='y')\ndef test_a(trials, verdict):\n    pass\n")
-    result = project.run()
-    assert result.ret == pytest.ExitCode.INTERRUPTED
-    result.stdout.fnmatch_lines(["*UserError: The claim a lacks its where.*"])
-
-
 def test_tests_without_claims_are_left_alone(project: Any) -> None:
     project.write("def test_a():\n    pass\n")
     result = project.run(own_store=True)
@@ -219,14 +205,6 @@ def test_tests_without_claims_are_left_alone(project: Any) -> None:
     result.assert_outcomes(passed=1)
     result.stdout.no_fnmatch_line("*claims:*")
     assert not (project.path / ".evoclaims").exists()
-
-
-def test_a_case_whose_parameters_have_a_comma_is_selected_by_its_name(project: Any) -> None:
-    project.write(
-        "@says('a')\n@pytest.mark.parametrize('case', ['x,y', 'z'])\ndef test_a(case, trials, verdict):\n    pass\n"
-    )
-    chosen = project.run("--collect-only", "-q", "--claims-only=a[x,y]")
-    assert [line for line in chosen.outlines if "::" in line] == ["claims/test_claims.py::test_a[x,y-a-smoke]"]
 
 
 CLASS = """

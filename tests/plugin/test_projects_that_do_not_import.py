@@ -23,20 +23,6 @@ MISTAKES = [
     ("raise SystemExit(3)\n", "SystemExit: 3 (tiny_paper.py, line {line})."),
 ]
 
-COMMANDS = [
-    ("plan",),
-    ("run",),
-    ("status",),
-    ("report",),
-    ("champion", "right", "--on", "parity"),
-    ("look", "parity"),
-    ("reproduce", "all"),
-    ("reference",),
-    ("accept",),
-    ("compare",),
-    ("export",),
-]
-
 
 def _spoil(project: Any, text: str) -> int:
     """Put a mistake at the end of the reproduction; return its line."""
@@ -56,21 +42,6 @@ def test_a_reproduction_that_does_not_import_is_a_sentence(
     sentence(
         result, "The module 'tiny_paper', which [tool.evoclaims] names, does not import: " + said.format(line=line)
     )
-
-
-@pytest.mark.parametrize("command", COMMANDS)
-def test_every_command_says_it_in_one_line(
-    project: Any, capsys: pytest.CaptureFixture[str], command: tuple[str, ...]
-) -> None:
-    project.write(a="supported")
-    text, said = MISTAKES[0]
-    line = _spoil(project, text)
-    assert main(command) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert err.count("\n") == 1
-    assert err.startswith("evoclaims: The module 'tiny_paper', which [tool.evoclaims] names, does not import: ")
-    assert err.endswith(said.format(line=line) + "\n")
 
 
 def test_a_figure_that_does_not_import_is_a_sentence(project: Any, capsys: pytest.CaptureFixture[str]) -> None:
