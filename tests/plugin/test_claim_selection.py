@@ -51,12 +51,13 @@ def test_a_selection_leaves_the_claims_of_the_tiers_it_names(
 
 def test_one_case_of_a_claim_is_selected_by_its_name(project: Any, sentence: Sentence) -> None:
     project.write(
-        "@says('a')\n@pytest.mark.parametrize('case', ['x', 'y'])\ndef test_a(case, trials, verdict):\n    pass\n"
+        "@says('a')\n@pytest.mark.parametrize('case', ['x,y', 'y'])\ndef test_a(case, trials, verdict):\n    pass\n"
     )
-    chosen = project.run("--collect-only", "-q", "--claims-only=a[y]")
-    assert [line for line in chosen.outlines if "::" in line] == ["claims/test_claims.py::test_a[y-a-smoke]"]
+    for case in ("x,y", "y"):
+        chosen = project.run("--collect-only", "-q", f"--claims-only=a[{case}]")
+        assert [line for line in chosen.outlines if "::" in line] == [f"claims/test_claims.py::test_a[{case}-a-smoke]"]
     sentence(
-        project.run("--claims-only=a[z]"), "There is no claim named 'a[z]'. Did you mean 'a[y]'? Known: a[x], a[y]."
+        project.run("--claims-only=a[z]"), "There is no claim named 'a[z]'. Did you mean 'a[y]'? Known: a[x,y], a[y]."
     )
     project.write(a="supported")
     sentence(project.run("--claims-only=a[x]"), "There is no claim named 'a[x]'. Known: a.")

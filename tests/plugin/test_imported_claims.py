@@ -68,12 +68,11 @@ def _judged(project: Project, *arguments: str) -> tuple[str, str]:
     return claim["outcome"], claim["reason"]
 
 
-def test_imported_trials_are_judged_and_their_record_says_where_they_are_from(ours: Project) -> None:
+def test_imported_trials_are_judged_also_beside_those_that_the_harness_runs(ours: Project) -> None:
     assert _judged(ours) == ("supported", "p = 5.41e-06 <= alpha = 0.05 at n = 10")
-
-
-def test_they_are_compared_with_trials_that_the_harness_runs(ours: Project) -> None:
     ours.write(a="verdict(trials('right', on='parity').mean_success > trials('theirs', on='parity').mean_success)")
+    assert _judged(ours)[0] == "supported"
+    ours.write(a="verdict(trials('theirs', on='parity').measure('mean_success', better='lower').between(0.7, 0.9))")
     assert _judged(ours)[0] == "supported"
 
 
@@ -253,11 +252,6 @@ def test_the_page_names_a_trial_by_its_seed_in_the_table_too(ours: Project) -> N
     page = unpacked.read(ours.path / "report" / "index.html")
     assert "2 of 20 trials diverged and count as the worst result (seeds 2 (12 in the table))." in page
     assert "seed 0 (10 in the table)" in page  # a line of the training curves
-
-
-def test_a_metric_is_measured_by_its_name(ours: Project) -> None:
-    ours.write(a="verdict(trials('theirs', on='parity').measure('mean_success', better='lower').between(0.7, 0.9))")
-    assert _judged(ours)[0] == "supported"
 
 
 def test_a_missing_table_is_a_sentence(ours: Project, sentence: Callable[[pytest.RunResult, str], None]) -> None:

@@ -96,7 +96,7 @@ def test_trials_that_other_processes_ran_again_before_their_claim_was_due_count_
     aged(10)
     file = project.path / "claims" / "test_claims.py"
     file.write_text(file.read_text() + LATE)
-    result = project.run_apart("--claims-processes=2")
+    result = project.run("--claims-processes=2", own_store=True)
     lines = _lines(result)
     assert "right on parity (smoke): 10 trials run again, 10 of 10 not the same to the bit as before" in lines
     assert result.ret == 1
@@ -136,13 +136,12 @@ def test_bits_are_not_said_to_be_unchanged_where_versions_differ(project: Any, a
     result.stdout.fnmatch_lines(["DRIFT in right on parity (smoke): mean_success is higher now*", sentence])
 
 
-@pytest.mark.parametrize("option", ["--claims-any-version", "--claims-stored"])
 def test_whatever_is_there_is_judged_and_the_table_says_that_its_versions_are_mixed(
-    project: Any, aged: Callable[..., None], option: str, monkeypatch: pytest.MonkeyPatch
+    project: Any, aged: Callable[..., None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     aged(5)
     monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(project.path / "page.md"))
-    result = project.run(option, own_store=True)
+    result = project.run("--claims-any-version", own_store=True)
     lines = _lines(result)
     assert f"† trials of mixed versions: numpy 1.0 and {HERE}: a (smoke)" in lines
     assert any("inconclusive†" in line for line in lines)
