@@ -66,7 +66,7 @@ def test_the_guide_s_repository_comes_to_verdicts_and_its_commands_do_what_they_
     for words in (["init", "-q"], ["add", "."], [*AUTHOR, "commit", "-qm", "first"]):
         assert pytester.run("git", *words).ret == 0  # trials of unknown revision are no references
     assert COMMANDS[0] == ["pytest", "-m", "smoke"]
-    result = pytester.runpytest_subprocess("-m", "smoke", "--claims-json=out.json", "-p", "no:xdist")
+    result = pytester.runpytest_inprocess("-m", "smoke", "--claims-json=out.json", "-p", "no:xdist")
     assert result.ret == 0
     claims = json.loads((pytester.path / "out.json").read_text())["claims"]
     assert {claim["claim"]: claim["outcome"] for claim in claims} == {"H1": "supported", "H2": "supported"}

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import sys
 from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 import unpacked
@@ -257,19 +254,6 @@ def test_the_page_names_a_trial_by_its_seed_in_the_table_too(ours: Project) -> N
 def test_a_missing_table_is_a_sentence(ours: Project, sentence: Callable[[pytest.RunResult, str], None]) -> None:
     (ours.path / "runs.csv").unlink()
     sentence(ours.run(), "runs.csv cannot be read: No such file or directory.")
-
-
-def test_exported_trials_give_the_verdict_that_they_gave_before(ours: Project, trials_of_both: Path) -> None:
-    table = io.StringIO()
-    writer = csv.writer(table)
-    writer.writerow(["algo", "seed", "success"])
-    for trial in Store(trials_of_both).results([]):
-        algo = "bad" if trial.spec["method"]["parameters"]["negated"] else "good"
-        writer.writerow([algo, trial.seed, trial.metrics["mean_success"]])
-    (ours.path / "runs.csv").write_text(table.getvalue())
-    ours.write(a=BETTER, b=BETTER.replace("theirs", "right"))
-    one, other = ours.json()["claims"]
-    assert [one["outcome"], one["reason"]] == [other["outcome"], other["reason"]] == ["supported", other["reason"]]
 
 
 def test_a_changed_table_is_compared_with_the_reference_trials_of_the_one_before(ours: Project) -> None:

@@ -24,11 +24,6 @@ Sentence = Callable[[pytest.RunResult, str], None]
 ALMOST = "verdict(trials('right', on='parity').solves_every_level.in_most_trials(p0=0.6))"
 
 
-@pytest.fixture(autouse=True)
-def _no_page(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv("GITHUB_STEP_SUMMARY", raising=False)
-
-
 @pytest.fixture
 def accepted(project: Any, kept: Path) -> Any:
     """The project with two claims whose verdicts are accepted."""
