@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from textwrap import indent
 from typing import Any
 
 import pytest
@@ -165,27 +166,35 @@ def test_the_fixtures_are_refused_to_tests_that_are_no_claims(project: Any) -> N
     result.stdout.fnmatch_lines(["*UserError: The fixtures `trials` and `verdict` are for tests marked with @claim*"])
 
 
-@pytest.mark.parametrize("indent", [("", ""), ("class TestThem:\n", "    ")])
-def test_a_claim_that_pytest_takes_for_no_test_is_a_sentence(
-    project: Any, sentence: Sentence, indent: tuple[str, str]
+CHECK = "@says('a')\ndef check_a(trials, verdict):\n    pass\n"
+TWO = "@says('a')\ndef test_it(trials, verdict):\n    pass\n\n@says('b')\ndef test_it(trials, verdict):\n    pass\n"
+CLASS = """
+class Stones:
+    @says("a")
+    def test_a(self, trials, verdict):
+        verdict(trials("right", on="parity").solves_every_level.in_most_trials())
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (CHECK, "the function check_a has @claim(...), and pytest takes none of this name for a test, so that"),
+        (TWO, "The tests of the claims a and b have one name, test_it, so that the second replaces the first"),
+        (CLASS, "the class Stones has a function with @claim(...), and pytest takes none of this name for one of"),
+    ],
+)
+def test_a_claim_that_would_not_be_collected_is_a_sentence(
+    project: Any, sentence: Sentence, text: str, said: str
 ) -> None:
-    first, before = indent
-    claimed = f"{first}{before}@says('a')\n{before}def check_a(trials, verdict):\n{before}    pass\n"
-    project.write(f"{claimed}\ndef test_other():\n    pass\n")
-    result = project.run()
-    assert result.ret == pytest.ExitCode.INTERRUPTED
-    sentence(result, "the function check_a has @claim(...), and pytest takes none of this name for a test, so that")
-    (project.path / "pyproject.toml").write_text(PYPROJECT + 'python_functions = "check"\n')
-    assert "a" in {report["claim"] for report in project.json()["claims"]}
-
-
-@pytest.mark.parametrize("before", ["", "    "])
-def test_a_claim_that_another_of_its_name_replaces_is_a_sentence(project: Any, sentence: Sentence, before: str) -> None:
-    two = [f"{before}@says('{name}')\n{before}def test_it(trials, verdict):\n{before}    pass\n" for name in "ab"]
-    project.write("class TestThem:\n" * bool(before) + "\n".join(two))
-    result = project.run()
-    assert result.ret == pytest.ExitCode.INTERRUPTED
-    sentence(result, "The tests of the claims a and b have one name, test_it, so that the second replaces the first")
+    for shown in (text, f"class TestThem:\n{indent(text, '    ')}"):
+        project.write(f"{shown}\ndef test_other():\n    pass\n")
+        result = project.run()
+        assert result.ret == pytest.ExitCode.INTERRUPTED
+        sentence(result, said)
+    if text == CHECK:
+        (project.path / "pyproject.toml").write_text(PYPROJECT + 'python_functions = "check"\n')
+        assert "a" in {report["claim"] for report in project.json()["claims"]}
 
 
 def test_claims_in_a_file_that_pytest_takes_for_none_of_tests_are_a_sentence(project: Any, sentence: Sentence) -> None:
@@ -206,21 +215,6 @@ def test_tests_without_claims_are_left_alone(project: Any) -> None:
     result.assert_outcomes(passed=1)
     result.stdout.no_fnmatch_line("*claims:*")
     assert not (project.path / ".evoclaims").exists()
-
-
-CLASS = """
-class Stones:
-    @says("a")
-    def test_a(self, trials, verdict):
-        verdict(trials("right", on="parity").solves_every_level.in_most_trials())
-"""
-
-
-def test_a_claim_in_a_class_that_is_none_of_tests_is_refused(project: Any, sentence: Any) -> None:
-    project.write(CLASS)
-    result = project.run()
-    assert result.ret == pytest.ExitCode.INTERRUPTED
-    sentence(result, "the class Stones has a function with @claim(...), and pytest takes none of this name for one of")
 
 
 @pytest.mark.parametrize("more", ["    __test__ = False\n", "\nclass TestStones(Stones):\n    pass\n"])
