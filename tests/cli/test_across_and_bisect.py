@@ -207,26 +207,17 @@ def test_an_environment_whose_python_is_gone_has_no_verdicts_and_stops_no_other(
     assert "No claim was judged in any of these environments" in err
 
 
-def test_no_claim_is_left_out_elsewhere_whatever_the_environment_says_of_pytest(
+def test_no_claim_is_left_out_nor_judged_by_trials_of_other_versions_whatever_the_environment_says_of_pytest(
     project: Project, stored: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """These would look like trials that the release has not changed."""
     project.write(a="refuted", b="supported")
-    monkeypatch.setenv("PYTEST_ADDOPTS", "-x")
-    monkeypatch.setattr(Environment, "python", Path(sys.executable))
-    elsewhere = Elsewhere(project.path, project.path / "claims", stored, "smoke", None, "cpu")
-    assert [one.outcome for one in elsewhere._run(Environment(project.path, {}), stored)] == ["refuted", "supported"]
-
-
-def test_trials_of_other_versions_are_not_judged_in_place_of_an_environments_own(
-    project: Project, stored: Store, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Whatever the options of pytest allow: they would look like trials that the release has not changed."""
-    project.write(b="supported")
-    monkeypatch.setenv("PYTEST_ADDOPTS", "--claims-any-version")
+    monkeypatch.setenv("PYTEST_ADDOPTS", "-x --claims-any-version")
     monkeypatch.setattr(Environment, "python", Path(sys.executable))
     elsewhere = Elsewhere(project.path, project.path / "claims", stored, "smoke", None, "cpu")
     here = installed_here()
-    assert elsewhere._run(Environment(project.path, here), stored)
+    found = elsewhere._run(Environment(project.path, here), stored)
+    assert [one.outcome for one in found] == ["refuted", "supported"]
     with pytest.raises(NotJudgedError, match=f"from trials of numpy {here['numpy']}, which is not what is installed"):
         elsewhere._run(Environment(project.path, {**here, "numpy": "1.0"}), stored)
 

@@ -61,7 +61,7 @@ def test_a_project_lies_in_a_folder_of_any_name(
         ("PYTEST_PLUGINS", "picky"),
         ("PYTEST_PLUGINS", "nope"),
         ("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1"),
-        ("pytest.ini", "-x -p picky -n 2 --nonsense"),
+        ("pytest.ini", "-x -n 2 --nonsense"),
     ],
 )
 def test_what_the_environment_or_another_file_sets_changes_nothing_and_stays(

@@ -168,9 +168,3 @@ def test_a_pilot_is_either_run_or_taken_from_what_has_run(
     with pytest.raises(SystemExit):
         evoclaims("power", "--run", "--stored")
     assert "argument --stored: not allowed with argument --run" in capsys.readouterr().err
-
-
-def test_a_pilot_changes_no_verdict(piloted: Evoclaims) -> None:
-    with_pilot = piloted("status")
-    shutil.rmtree("pilot")
-    assert piloted("status") == with_pilot

@@ -62,16 +62,6 @@ def test_the_longest_comes_first_and_each_once(took: list[float], processes: int
     )
 
 
-def test_small_conditions_that_share_programs_stay_together() -> None:
-    batches = [_batch("large", 100.0), _batch("small", 1.0), _batch("tiny", 0.5)]
-    conditions = _conditions(batches, alike=True)
-    conditions["large", "parity"] = Condition(HandBuilt(), NParity(3), "curriculum", Budget(generations=1))
-    assert [[job.method for job in group] for group in in_queue(batches, conditions, 2)] == [
-        ["large"],
-        ["small", "tiny"],
-    ]
-
-
 @settings(max_examples=20)
 @given(st.lists(st.floats(0.5, 10), min_size=100, max_size=100), st.booleans())
 def test_four_workers_end_a_hundred_small_batches_within_15_percent_of_their_share(
