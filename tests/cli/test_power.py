@@ -160,11 +160,3 @@ def test_a_mistake_is_a_sentence(evoclaims: Evoclaims, arguments: tuple[str, ...
     status, _, err = evoclaims("power", *arguments)
     assert (status, err.count("\n"), PILOT.exists()) == (2, 1, False)
     assert said in err
-
-
-def test_a_pilot_is_either_run_or_taken_from_what_has_run(
-    evoclaims: Evoclaims, capsys: pytest.CaptureFixture[str]
-) -> None:
-    with pytest.raises(SystemExit):
-        evoclaims("power", "--run", "--stored")
-    assert "argument --stored: not allowed with argument --run" in capsys.readouterr().err

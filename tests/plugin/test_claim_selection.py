@@ -131,7 +131,6 @@ def test_the_full_tier_judges_the_papers_own_sentence(project: Any) -> None:
     [
         (("--claims-only", "G1"), "There is no claim named 'G1'. Known: first, second."),
         (("--claims-only", "first,secnd"), "no claim named 'secnd'. Did you mean 'second'? Known: first, second."),
-        (("--claims-undecided", "maybe"), "argument --claims-undecided: invalid choice: 'maybe'"),
     ],
 )
 def test_an_unknown_name_ends_the_run_with_a_sentence_before_any_trial(

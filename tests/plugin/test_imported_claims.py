@@ -124,7 +124,6 @@ def test_a_new_history_names_the_edited_table(ours: Project) -> None:
     ("tier", "count", "said"),
     [
         ("smoke", 9, "underpowered: needs n = 10 trials of theirs on parity, and there are 9"),
-        ("full", 4, "underpowered: needs n = 5 trials of theirs on parity, and there are 4"),
         ("full", 9, "underpowered: needs n = 10 trials of theirs on parity, and there are 9; the evidence: p = "),
     ],
 )

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from importlib import metadata
-from typing import Any, Protocol
+from typing import Any
 
 _WITHOUT_TIER = {"jobs", "verify", "merge", "tables"}
 _TIERS = {
@@ -21,11 +22,8 @@ _PROCESSES = (
 )
 
 
-class _Add(Protocol):
-    """Makes the parser of a command, which has the options that commands of its kind share."""
-
-    def __call__(self, name: str, text: str, kept: str = ".evoclaims") -> argparse.ArgumentParser:
-        """Return the parser; `text` is its help, and `kept` the folder of trials below the project's root."""
+_Add = Callable[[str, str], argparse.ArgumentParser]
+"""Makes the parser of a command by its name and help; it has the options that commands of its kind share."""
 
 
 def _option(command: argparse._ActionsContainer, written: str, text: str, **more: Any) -> None:
@@ -41,9 +39,10 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--version", action="version", version=f"evoclaims {metadata.version('evoclaims')}")
     commands = made.add_subparsers(dest="command", required=True, metavar="command")
 
-    def add(name: str, text: str, kept: str = ".evoclaims") -> argparse.ArgumentParser:
+    def add(name: str, text: str) -> argparse.ArgumentParser:
         command = commands.add_parser(name, help=text.partition("; ")[0], description=text)
         command.set_defaults(refuse=command.error)
+        kept = ".evoclaims-releases" if name in ("across", "bisect") else ".evoclaims"
         _option(command, "--storage DIR", f"folder of trials ({kept} in the project's root)")
         if name not in _WITHOUT_TIER:
             default, known = _TIERS.get(name, ("smoke", "smoke (default) or full"))
@@ -229,7 +228,6 @@ def _comparing(add: _Add) -> None:
         "judge claims with several releases of a package, files of constraints or Pythons; each has an environment, "
         "and is compared with the first; exit status 1 if a verdict changed, trials drifted, or an "
         "environment has no verdicts",
-        ".evoclaims-releases",
     )
     across.add_argument(
         "--package",
@@ -243,11 +241,7 @@ def _comparing(add: _Add) -> None:
     _option(across, "--as FORM", "also write it: markdown, csv or json", dest="form")
     _option(across, "--out FILE", "file to write (report/across.FORM; .md for markdown)")
 
-    bisect = add(
-        "bisect",
-        "find the release of a package in which a claim's verdict, or its trials, changed",
-        ".evoclaims-releases",
-    )
+    bisect = add("bisect", "find the release of a package in which a claim's verdict, or its trials, changed")
     bisect.add_argument("claim", help="the claim, such as G9, or one case of it, such as 'G1[n_parity]'")
     _option(bisect, "--package NAME", "the package", required=True)
     _option(bisect, "--good VERSION", "a release before the change", required=True)
