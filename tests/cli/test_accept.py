@@ -70,27 +70,16 @@ def test_not_run_and_error_never_take_the_place_of_a_verdict(accepted: Evoclaims
     assert "left alone: b (smoke) is not run now (its test was skipped (not today)): it stays refuted" in out
 
 
-def test_both_tiers_are_accepted_unless_one_is_named(evoclaims: Evoclaims) -> None:
-    _, out, _ = evoclaims("accept")
-    assert "left alone: a (full) is not run now (right on parity: 10 of 10 trials are missing)" in out
-    assert "accepted: a (smoke)" in out
-    assert "(full)" not in evoclaims("accept", "--tier=smoke")[1]
-
-
-def test_the_history_of_a_claim_that_is_gone_is_kept_and_said(accepted: Evoclaims, project: Project) -> None:
-    project.write(a="supported")
-    status, out, _ = accepted("accept", "--tier=smoke")
-    assert (status, out.splitlines()[0]) == (0, "kept: b (smoke), which is no longer among the claims")
-    assert ("smoke", "b") in history.load(FILE)
-    assert "kept:" not in accepted("accept", "--tier=full")[1]
-
-
-def test_claims_that_are_gone_are_said_in_the_order_of_their_names(accepted: Evoclaims) -> None:
+def test_histories_of_claims_that_are_gone_are_kept_and_said_in_order(accepted: Evoclaims, project: Project) -> None:
     kept = history.load(FILE)
     gone = [f"gone_{letter}" for letter in "abcdef"]
     FILE.write_text(history.dump({**kept, **{("smoke", name): kept["smoke", "a"] for name in gone}}))
-    _, out, _ = accepted("accept", "--tier=smoke")
-    assert [line.split()[1] for line in out.splitlines() if line.startswith("kept: ")] == gone
+    project.write(a="supported")
+    status, out, _ = accepted("accept", "--tier=smoke")
+    assert (status, out.splitlines()[0]) == (0, "kept: b (smoke), which is no longer among the claims")
+    assert [line.split()[1] for line in out.splitlines() if line.startswith("kept: ")] == ["b", *gone]
+    assert ("smoke", "b") in history.load(FILE)
+    assert "kept:" not in accepted("accept", "--tier=full")[1]
 
 
 def test_accepted_verdicts_that_are_torn_are_not_written_over(evoclaims: Evoclaims) -> None:

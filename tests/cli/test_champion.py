@@ -108,8 +108,6 @@ def test_a_changed_champion_is_told(trained: Evoclaims) -> None:
     [
         (("naet", "--on=parity"), "There is no method named 'naet'. Did you mean 'neat'?"),
         (("neat", "--on=partiy"), "There is no task for neat named 'partiy'. Did you mean 'parity'?"),
-        (("neat", "--on=parity", "--tier=smok"), "There is no tier named 'smok'. Did you mean 'smoke'?"),
-        (("neat", "--on=parity", "--device=tpu"), "There is no device named 'tpu'."),
         (("neat", "--on=parity", "--seed=-1"), "A seed is a whole number from 0 to 2147483647, not -1."),
         (
             ("neat", "--on=parity", "--seed=77"),

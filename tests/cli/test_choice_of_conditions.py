@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import jax
-import pytest
-from hand_made_verdicts import report, verdict
 from tiny_project import Evoclaims
 
-from evoclaims.cli import run
 from evoclaims.cli.project import open_project
 from evoclaims.cli.running import named
 from evoclaims.trials.result_making import make_unfinished
@@ -49,14 +45,6 @@ def test_without_a_name_what_claims_need_runs_and_nothing_else(project: Any, evo
     assert (status, err.count("Traceback")) == (2, 0)
     assert "cannot be collected: " in err
     assert err.endswith("Without claims only named conditions run, as in right --on parity.\n")
-
-
-def test_trials_of_a_variant_that_ran_out_of_less_time_are_counted_among_those_to_run(evoclaims: Evoclaims) -> None:
-    _out_of_time("traded", 1.0)
-    status, out, _ = evoclaims("run", "--variant=traded", "--trials=1")
-    assert status == 0
-    assert "  right on parity (smoke): 1 trial to run, time unknown\n" in out
-    assert "  seed 0: done" in out
 
 
 def test_a_trial_that_ran_out_of_as_much_time_runs_again_only_with_retry(evoclaims: Evoclaims) -> None:
@@ -99,15 +87,3 @@ def test_run_runs_the_seeds_that_it_is_asked_for_and_none_for_the_drift_check(ev
     for seeds in (["--first-seed=9", "--trials=1"], []):
         assert evoclaims("run", "right", "--on=parity", *seeds)[0] == 0
     assert {result.seed for result in Store(Path(".evoclaims")).results([])} == set(range(10))
-
-
-def test_a_variant_that_fewer_trials_leave_open_is_not_said_to_change_the_verdict(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    plain = [report("A", "refuted", verdict=verdict("refuted", n=30))]
-    varied = [report("A", "inconclusive", verdict=verdict("inconclusive"))]
-    paper = SimpleNamespace(variants={"x": SimpleNamespace(says="otherwise")})
-    project: Any = SimpleNamespace(judge_variants=lambda asked: [plain, varied], reproduction=paper)
-    run._print_matrix(project, "smoke", "x")
-    says = "  A: inconclusive with fewer trials than decide the protocol's own verdict, refuted\n"
-    assert says in capsys.readouterr().out

@@ -28,13 +28,6 @@ def _evoclaims(folder: Path, *arguments: str, code: str = COMMAND) -> subprocess
     )
 
 
-def test_a_mistake_is_one_sentence_on_standard_error(tmp_path: Path) -> None:
-    done = _evoclaims(tmp_path, "status")
-    assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr.startswith("evoclaims: No pyproject.toml at or above")
-    assert done.stderr.count("\n") == 1
-
-
 HELP = """
 import sys
 from evoclaims.cli import main

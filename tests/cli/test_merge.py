@@ -63,7 +63,6 @@ def test_what_differs_is_named_and_stays(evoclaims: Evoclaims, halves: tuple[Sto
         (("right", "nowhere"), "There is no trial store 'nowhere': the folder does not exist."),
         (("right", "claims"), "claims is not a trial store: it has no store.json"),
         (("right", ".evoclaims"), ".evoclaims is the store to copy into"),
-        (("right", "--storage=claims"), "claims is not a trial store: it has no store.json"),
     ],
 )
 def test_what_is_no_other_store_is_refused_before_anything_is_copied(

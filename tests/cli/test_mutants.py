@@ -52,18 +52,14 @@ def test_a_claim_notices_a_blind_task_and_no_fault_in_what_never_learns(
     assert load(Path("mutants.toml")) == matrix
 
 
-def test_one_fault_of_one_target_can_be_asked_for(evoclaims: Evoclaims, stored: Store) -> None:
-    assert evoclaims("mutants", "--mutant=paralysed", "--of=parity")[0] == 0
-    (attempt,) = load(Path("mutants.toml"))["smoke", "a"].attempts
-    assert (attempt.mutant, attempt.target) == ("paralysed", "parity")
-
-
-def test_a_fault_whose_trials_cannot_be_stored_is_not_called_broken(
+def test_one_fault_of_one_target_whose_trials_cannot_be_stored_is_not_called_broken(
     evoclaims: Evoclaims, stored: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     sound = set(stored.ids())
-    assert evoclaims("mutants", "--mutant=paralysed")[0] == 0
+    assert evoclaims("mutants", "--mutant=paralysed", "--of=parity")[0] == 0
     before = load(Path("mutants.toml"))
+    (attempt,) = before["smoke", "a"].attempts
+    assert (attempt.mutant, attempt.target) == ("paralysed", "parity")
     forget(stored, [trial for trial in stored.results([]) if trial.id not in sound])
 
     def read_only(path: Any, *arguments: Any, **more: Any) -> Any:
@@ -86,7 +82,6 @@ def test_a_users_mistake_is_one_sentence(evoclaims: Evoclaims, stored: Store) ->
     for arguments, said in (
         (("--mutant=blnd",), "There is no mutant named 'blnd'. Did you mean 'blind'?"),
         (("--of=neat",), "There is no method or task named 'neat'."),
-        (("--tier=ful",), "There is no tier named 'ful'."),
     ):
         status, _, err = evoclaims("mutants", *arguments)
         assert (status, err.count("\n")) == (2, 1)

@@ -59,17 +59,9 @@ def test_a_process_that_dies_loses_its_condition_alone_and_the_next_call_runs_th
     assert rows["smoke", "a"].named(Fate.KILLED) == ("right: negated",)
     assert rows["smoke", "a"].named(Fate.BROKEN) == ("right: dies",)
     assert rows["smoke", "b"].named(Fate.KILLED) == ("wrong: negated",)
+    status, out, _ = evoclaims("mutants", "--mutant=negated", "--stored")
+    assert (status, load(Path("mutants.toml")), "conditions have ended" in out) == (0, rows, False)
     assert stored.ids() == before  # the opposite of the right network is the wrong one, which has run already
-
-
-@pytest.mark.usefixtures("stored")
-def test_several_processes_write_what_one_writes(evoclaims: Evoclaims) -> None:
-    assert evoclaims("mutants", "--mutant=blind", "--numprocesses=2")[0] == 0
-    in_processes = Path("mutants.toml").read_text()
-    Path("mutants.toml").unlink()
-    status, out, _ = evoclaims("mutants", "--mutant=blind", "--stored")
-    assert (status, Path("mutants.toml").read_text()) == (0, in_processes)
-    assert "conditions have ended" not in out
 
 
 CONDITION = Condition(HandBuilt(), NParity(2), "curriculum", Budget(generations=1))

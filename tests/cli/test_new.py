@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import json
 import os
 import re
@@ -137,18 +136,6 @@ def test_what_cannot_be_written_is_a_sentence(
     (tmp_path / "file").touch()
     status, _, error = _new(capsys, *arguments)
     assert (status, said in error) == (2, True)
-
-
-def test_a_disk_that_fills_up_is_a_sentence(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def full(*_: object, **__: object) -> None:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    monkeypatch.setattr("shutil.copyfile", full)
-    status, _, error = _new(capsys, str(tmp_path))
-    told = f"evoclaims: Cannot write a project to {tmp_path}: No space left on device. Delete what is there, or name"
-    assert (status, error) == (2, f"{told} another.\n")
 
 
 def test_a_wheel_is_enough_to_judge_the_paper_s_claims(tmp_path: Path) -> None:

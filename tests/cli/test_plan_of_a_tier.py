@@ -147,11 +147,3 @@ def test_plan_takes_the_pace_of_other_tiers_where_a_condition_has_not_run(evocla
     out = evoclaims("plan", "--tier", "full")[1]
     assert "took on one" not in out
     assert re.search(r"^right on parity +0 +10 +80 +\d+ s$", out, re.MULTILINE)
-
-
-def test_plan_times_a_few_steps_where_it_is_asked_to_and_stores_none(evoclaims: Evoclaims) -> None:
-    status, out, _ = evoclaims("plan", "--measure", "--tier", "full")
-    assert status == 0
-    assert re.search(r"^right on parity +0 +10 +80 +\d+ s$", out, re.MULTILINE)
-    assert "unknown" not in out
-    assert not Path(".evoclaims/trials").exists()

@@ -154,24 +154,9 @@ def test_a_condition_that_breaks_does_not_stop_the_others(piloted: Evoclaims, pr
         (("--stored", "--trials=101"), "to 100 trials per condition, not 101."),
         (("--run", "--first-seed=2147483647"), "A seed is a whole number from 0 to 2147483647"),
         (("--draws=0",), "--draws takes a number from 1 up, not 0."),
-        (("--tier=ful",), "There is no tier named 'ful'."),
     ],
 )
 def test_a_mistake_is_a_sentence(evoclaims: Evoclaims, arguments: tuple[str, ...], said: str) -> None:
     status, _, err = evoclaims("power", *arguments)
     assert (status, err.count("\n"), PILOT.exists()) == (2, 1, False)
     assert said in err
-
-
-def test_a_pilot_is_either_run_or_taken_from_what_has_run(
-    evoclaims: Evoclaims, capsys: pytest.CaptureFixture[str]
-) -> None:
-    with pytest.raises(SystemExit):
-        evoclaims("power", "--run", "--stored")
-    assert "argument --stored: not allowed with argument --run" in capsys.readouterr().err
-
-
-def test_a_pilot_changes_no_verdict(piloted: Evoclaims) -> None:
-    with_pilot = piloted("status")
-    shutil.rmtree("pilot")
-    assert piloted("status") == with_pilot

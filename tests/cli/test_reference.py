@@ -54,7 +54,7 @@ def test_stored_trials_join_those_that_are_committed(evoclaims: Evoclaims, monke
     evoclaims("run", "right", "--trials", "5")
     evoclaims("reference", "--unknown-revision")
     evoclaims("run", "right", "--trials", "4", "--first-seed", "5", "--storage", "later")
-    status, out, err = evoclaims("reference", "--unknown-revision", "--storage", "later")
+    out = evoclaims("reference", "--unknown-revision", "--storage", "later")[1]
     path = references.path_of(Path.cwd() / "reference", "smoke", "right", "parity")
     assert f"wrote {path}: 5 trials" in out
     evoclaims("run", "right", "--trials", "5", "--first-seed", "5", "--storage", "later")

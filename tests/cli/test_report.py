@@ -39,28 +39,6 @@ def test_one_tier_alone_still_shows_the_papers_sentence(evoclaims: Evoclaims) ->
     assert "<blockquote>a at full size</blockquote>" in page
 
 
-def test_an_empty_store_without_references_makes_a_page_that_says_so(evoclaims: Evoclaims) -> None:
-    assert evoclaims("report")[0] == 0
-    page = Path("report/index.html").read_text(encoding="utf-8")
-    assert "No claim has been judged: neither the store nor the committed reference trials hold" in page
-
-
-def test_the_accepted_verdicts_are_read(evoclaims: Evoclaims) -> None:
-    Path("verdicts.toml").write_text("schema = 99\n")
-    status, _, err = evoclaims("report")
-    assert status == 2
-    assert "its schema is 99" in err
-
-
-@pytest.mark.parametrize(
-    ("arguments", "text"),
-    [
-        (("--tier", "fulll"), "There is no tier named 'fulll'. Did you mean 'full'? Known: all, full, smoke."),
-        (("--out", "pyproject.toml"), "Cannot write pyproject.toml/index.html: "),
-        (("--storage", "pyproject.toml"), "is a file, not a folder"),
-    ],
-)
-def test_a_mistake_is_a_sentence(evoclaims: Evoclaims, arguments: tuple[str, ...], text: str) -> None:
-    status, _, err = evoclaims("report", *arguments)
-    assert status == 2
-    assert text in " ".join(err.split())
+def test_a_folder_that_cannot_be_written_is_a_sentence(evoclaims: Evoclaims) -> None:
+    status, _, err = evoclaims("report", "--out", "pyproject.toml")
+    assert (status, "Cannot write pyproject.toml/index.html: " in err) == (2, True)

@@ -62,16 +62,6 @@ def test_the_longest_comes_first_and_each_once(took: list[float], processes: int
     )
 
 
-def test_small_conditions_that_share_programs_stay_together() -> None:
-    batches = [_batch("large", 100.0), _batch("small", 1.0), _batch("tiny", 0.5)]
-    conditions = _conditions(batches, alike=True)
-    conditions["large", "parity"] = Condition(HandBuilt(), NParity(3), "curriculum", Budget(generations=1))
-    assert [[job.method for job in group] for group in in_queue(batches, conditions, 2)] == [
-        ["large"],
-        ["small", "tiny"],
-    ]
-
-
 @settings(max_examples=20)
 @given(st.lists(st.floats(0.5, 10), min_size=100, max_size=100), st.booleans())
 def test_four_workers_end_a_hundred_small_batches_within_15_percent_of_their_share(
@@ -297,11 +287,8 @@ main(sys.argv[1:])
 """
 
 
-@pytest.mark.parametrize("command", [["run"], ["mutants"], ["power", "--run"]])
-def test_a_command_keeps_off_gpus_before_libraries_make_arrays_as_they_are_imported(
-    command: list[str], project: Project
-) -> None:
-    call = [sys.executable, "-c", LOOKS, *command, "--numprocesses", "auto"]
+def test_a_command_keeps_off_gpus_before_libraries_make_arrays_as_they_are_imported(project: Project) -> None:
+    call = [sys.executable, "-c", LOOKS, "power", "--run", "--numprocesses", "auto"]
     found = subprocess.run(call, cwd=project.path, capture_output=True, text=True, check=False)
     assert found.stdout == "has not looked\n", found.stderr
 
@@ -349,30 +336,3 @@ def test_a_killed_workers_batch_is_done_again_and_nothing_is_lost_or_twice(evocl
     assert out.count("3 of 3 conditions have ended") == 1
     assert evoclaims("run", "--on=parity", "--trials=3", "--storage=alone")[0] == 0
     assert [trial.digest for trial in store.results([])] == [trial.digest for trial in alone.results([])]
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("deadly")
-def test_a_batch_that_kills_every_process_fails_with_the_reason_and_the_rest_is_done(evoclaims: Evoclaims) -> None:
-    Path("deaths").write_text("99")
-    status, _, err = evoclaims("run", "--on=parity", "--numprocesses=2", "--trials=2")
-    assert status == 1
-    assert "killed on parity (smoke) failed: its process died (SIGKILL: the system sends that where" in err
-    assert "1 of 3 conditions failed." in err
-    assert len(Store(Path(".evoclaims")).ids()) == 4
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("project")
-def test_two_runs_beside_each_other_share_the_work(evoclaims: Evoclaims) -> None:
-    spy = "from evoclaims.cli import main; raise SystemExit(main(['run', 'coin', '--numprocesses=2', '--tier=full']))"
-    other = subprocess.Popen([sys.executable, "-c", spy], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    status, out, err = evoclaims("run", "coin", "--numprocesses=2", "--tier=full")
-    told, errors = other.communicate()
-    assert (status, other.returncode) == (0, 0), err + errors
-    lines = [[line for line in text.splitlines() if "seed" in line] for text in (out, told)]
-    assert lines[0] == lines[1]
-    assert len(lines[0]) == 10
-    assert "differently" not in out + told + err + errors
-    store = Store(Path(".evoclaims"))
-    assert (len(store.ids()), verify(store, repair=False)) == (10, [])

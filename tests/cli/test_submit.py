@@ -125,17 +125,6 @@ def test_what_a_variant_changes_is_submitted_under_it(evoclaims: Evoclaims, slur
     assert "The variant traded changes none of these conditions at the smoke tier; it changes: right on parity." in err
 
 
-def test_trying_writes_and_submits_nothing(evoclaims: Evoclaims, slurm: StandIn) -> None:
-    before = sorted(Path.cwd().rglob("*"))
-    status, out, _ = evoclaims("submit", "--dry-run", "--on=parity")
-    assert status == 0
-    assert "right on parity: 10 trials, about" in out
-    assert not slurm.script.exists()
-    assert sorted(path for path in Path.cwd().rglob("*") if "__pycache__" not in path.parts) == [
-        path for path in before if "__pycache__" not in path.parts
-    ]
-
-
 def test_the_cores_of_a_job_are_told_and_asked_for(evoclaims: Evoclaims, slurm: StandIn) -> None:
     status, out, _ = evoclaims("submit", "right", "--cpus=4", "--dry-run")
     assert status == 0

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import argparse
-import re
 import shutil
 from pathlib import Path
 
 import pytest
 from tiny_project import Evoclaims, Project
 
-from evoclaims.cli.arguments import parser
 from evoclaims.trials.store import Store
 
 PAGE = """# Title
@@ -96,26 +93,6 @@ def test_c(trials, verdict):
     assert "| b is a sentence of many more words than ten, … | ✗ | – | – |" in Path("page.md").read_text()
 
 
-def test_refutations_that_end_otherwise_are_listed_by_variant(committed: Evoclaims) -> None:
-    Path("page.md").write_text(PAGE.replace("verdicts full smoke smoke:traded", "refutations smoke"))
-    committed("tables", "page.md")
-    text = Path("page.md").read_text()
-    assert "0 refuted cases of the smoke tier end otherwise under a variant:" in text
-
-
-def test_commands_are_a_section_each_with_every_argument(committed: Evoclaims) -> None:
-    Path("page.md").write_text(PAGE.replace("verdicts full smoke smoke:traded", "commands"))
-    committed("tables", "page.md")
-    text = Path("page.md").read_text()
-    sections = dict(re.findall(r"^## (\S+)\n(.*?)(?=^## |<!--)", text, re.MULTILINE | re.DOTALL))
-    (chosen,) = (action for action in parser()._actions if isinstance(action, argparse._SubParsersAction))
-    assert sections.keys() == chosen.choices.keys()
-    for name, command in chosen.choices.items():
-        options = {option for action in command._actions for option in action.option_strings} - {"-h", "--help"}
-        assert set(re.findall(r"^\| `(--[\w-]+)", sections[name], re.MULTILINE)) == options, name
-        assert f"[`{name}`](#{name})" in text
-
-
 def test_a_table_of_details_has_the_claims_that_a_variant_touches(committed: Evoclaims) -> None:
     Path("page.md").write_text(PAGE.replace("verdicts full smoke smoke:traded", "details smoke"))
     assert committed("tables", "page.md")[0] == 1
@@ -134,35 +111,6 @@ def test_a_store_changes_no_table(committed: Evoclaims, trials_of_both: Path) ->
     shutil.copytree(trials_of_both, ".evoclaims")
     assert committed("tables", "page.md")[0] == 1
     assert "**supported**" not in Path("page.md").read_text()
-
-
-def test_cases_that_end_alike_share_a_line(committed: Evoclaims, project: Project) -> None:
-    project.write(
-        """
-@says("a")
-@pytest.mark.parametrize("method", ["right", "wrong", "coin", "broken"])
-def test_a(trials, verdict, method):
-    verdict(trials(method, on="parity").solves_every_level.in_most_trials())
-"""
-    )
-    Path("page.md").write_text(PAGE.replace("full smoke smoke:traded", "smoke full"))
-    committed("tables", "page.md")
-    assert (
-        "| a | a at full size | broken, coin: not run<br>right: **supported** (10 of 10 trials; A)<br>"
-        "wrong: **refuted** (0 of 10 trials; A) | not run |"
-    ) in Path("page.md").read_text()
-
-
-def test_published_numbers_are_a_table_too(committed: Evoclaims) -> None:
-    Path("reported.toml").write_text(
-        'trials = 10\n[plots.parity.mean_success]\nplace = "x"\nscale = [0, 1]\nmethods.right.mean = [1]\n'
-    )
-    Path("page.md").write_text(PAGE.replace("verdicts full smoke smoke:traded", "numbers smoke all"))
-    committed("tables", "page.md")
-    text = Path("page.md").read_text()
-    assert "✓ consistent | 7 to 10 trials at 1, ours 10 (exact: inside)" in text
-    assert "✗ contradicted | 7 to 10 trials at 1, ours 0 (exact: outside)" in text
-    assert "* traded: 1 contradicted; by condition: 1 contradicted" in text
 
 
 @pytest.mark.parametrize(

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import pytest
 from tiny_project import Evoclaims
 
-from evoclaims.cli import main
 from evoclaims.trials.store import Store
 
 
@@ -37,11 +35,3 @@ def test_verify_reads_no_verdicts_and_says_so(evoclaims: Evoclaims, stored: Stor
     verdict.write_text("torn")
     assert evoclaims("verify")[:2] == (0, "20 trials in .evoclaims, 0 problems\n")
     assert evoclaims("status")[1].splitlines()[-1] == "claims (smoke): 1 supported, 1 refuted"
-
-
-def test_the_help_of_verify_says_what_is_read(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit):
-        main(["verify", "--help"])
-    text = " ".join(capsys.readouterr().out.split())
-    assert "check every stored trial, champion and checkpoint" in text
-    assert "verdicts are not read, since `evoclaims status` judges the trials anew" in text

@@ -125,15 +125,15 @@ def test_an_alarm_ends_with_1_until_a_new_series_begins(watching: Evoclaims, sto
     text = Path("issue.md").read_text(encoding="utf-8")
     assert text.startswith("# Trials have changed: ")
     assert "mean\\_success is higher" in text
-    assert watching("watch")[0] == 1
+    assert watching("watch", "--trials=3")[0] == 1
     COMMITTED.write_bytes(sound)  # which begins a series, as the edit of any claim may
-    status, out, _ = watching("watch")
+    status, out, _ = watching("watch", "--trials=3")
     assert status == 1
     assert re.search(r"The alarm of series 2 \(right.*\) stays until a night is run with --restart\.\nALARM on ", out)
     assert "moved: right on parity: mean_success is higher" in out
     assert "No alarm" not in out
-    assert watching("watch", "--restart")[0] == 0
-    assert watching("watch")[0] == 0
+    assert watching("watch", "--restart", "--trials=3")[0] == 0
+    assert watching("watch", "--trials=3")[0] == 0
     assert [(night.series, night.restart) for night in load(FILE)[1]] == [
         *((1, False), (2, False), (2, False), (3, False), (4, True), (4, False))
     ]

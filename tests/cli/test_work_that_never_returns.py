@@ -6,7 +6,6 @@ import os
 import subprocess
 import sys
 
-import pytest
 from tiny_project import Project
 
 from evoclaims.trials.store import Store
@@ -94,10 +93,7 @@ def test_the_command_ends_with_its_trials_timed_out(project: Project) -> None:
         )
 
 
-@pytest.mark.parametrize("workers", [(), ("-n2",)], ids=["alone", "xdist"])
-def test_a_run_goes_on_to_the_other_claims_and_says_whose_time_was_over(
-    project: Project, stored: Store, workers: tuple[str, ...]
-) -> None:
+def test_a_run_goes_on_to_the_other_claims_and_says_whose_time_was_over(project: Project, stored: Store) -> None:
     """The trials of the right network are stored: it must not be short of time."""
     _stuck(project, "{**METHODS, 'looping': Looping()}")
     project.write(
@@ -105,8 +101,7 @@ def test_a_run_goes_on_to_the_other_claims_and_says_whose_time_was_over(
         supported="supported",
         better="verdict(trials('right', on='parity').mean_success > trials('looping', on='parity').mean_success)",
     )
-    limit = f"--claims-time-limit={LIMIT}"
-    done = project.run(limit, *workers, own_store=True) if workers else project.run_apart(limit)
+    done = project.run_apart(f"--claims-time-limit={LIMIT}")
     shown = " ".join("\n".join(done.outlines).split())
     ended = "10 of 10 trials of looping on parity ran out of time (seeds 0, 1, 2, 3, 4, 5, 6, 7, 8, 9)"
     assert "claims: 1 supported, 2 inconclusive" in shown

@@ -91,7 +91,7 @@ def test_a_project_with_a_training_loop_comes_to_a_verdict_and_all_commands_know
 ) -> None:
     monkeypatch.setenv("COLUMNS", "160")
     written(pytester.path, *PROJECT)
-    result = pytester.runpytest_subprocess("-m", "smoke", "--claims-json=out.json", "-p", "no:xdist")
+    result = pytester.runpytest_inprocess("-m", "smoke", "--claims-json=out.json", "-p", "no:xdist")
     assert result.ret == 0
     claims = json.loads((pytester.path / "out.json").read_text())["claims"]
     assert [(claim["claim"], claim["outcome"]) for claim in claims] == [("H1", "supported")]

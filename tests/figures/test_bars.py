@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import io
 import math
 from typing import Any
 
 import matplotlib as mpl
+import pandas as pd
 import pytest
 from matplotlib.patches import Rectangle
 from scipy.stats import mannwhitneyu
@@ -44,11 +46,11 @@ def _bars(drawing: Drawing) -> list[Rectangle]:
 
 
 def test_every_trial_is_a_dot_and_a_row_of_the_table(paper: Any) -> None:
-    ours, theirs = [i / 10 for i in range(10)], [0.5 + i / 20 for i in range(10)]
+    ours, theirs = [i / 9 for i in range(10)], [2 + i / 21 for i in range(10)]
     paper.put("one", "small", ours)
     paper.put("other", "small", theirs)
     drawing = paper.draw(_rewards())
-    assert [bar.get_height() for bar in _bars(drawing)] == pytest.approx([4.5, 7.25])
+    assert [bar.get_height() for bar in _bars(drawing)] == pytest.approx([5, 20 + 45 / 21])
     trials = drawing.table[drawing.table["what"] == "trial"]
     ids = [TrialSpec(CONDITIONS[m, "small"], seed).id for m in ("one", "other") for seed in range(10)]
     assert list(trials["trial"]) == ids
@@ -56,13 +58,8 @@ def test_every_trial_is_a_dot_and_a_row_of_the_table(paper: Any) -> None:
     dots = drawing.figure.axes[0].collections
     assert sum(len(group.get_offsets()) for group in dots if hasattr(group, "get_sizes")) == 20
     assert (drawing.shown, drawing.missing) == (20, ())
-
-
-def test_the_table_has_the_tests_behind_the_brackets(paper: Any) -> None:
-    ours, theirs = [i / 10 for i in range(10)], [2 + i / 20 for i in range(10)]
-    paper.put("one", "small", ours)
-    paper.put("other", "small", theirs)
-    drawing = paper.draw(_rewards())
+    again = pd.read_csv(io.BytesIO(contents(drawing)["csv"]))
+    assert list(again[again["what"] == "trial"]["value"]) == list(trials["value"])  # to the last digit
     (test,) = drawing.table[drawing.table["what"] == "Mann-Whitney U"].to_dict("records")
     assert (test["series"], test["against"]) == ("The One", "The Other")
     assert test["value"] == mannwhitneyu(ours, theirs, alternative="two-sided").pvalue
@@ -141,7 +138,7 @@ def test_published_numbers_of_another_size_are_told_and_not_drawn(paper: Any) ->
     assert list(drawing.table[drawing.table["what"] == "reported"]["value"]) == [4000.0]
 
 
-@pytest.mark.parametrize("values", [[0.0] * 10, [-3.0 + i for i in range(10)], [-1.0] * 10, [1e3] * 10, [0.3]])
+@pytest.mark.parametrize("values", [[0.0] * 10, [-3.0 + i for i in range(10)], [1e3] * 10])
 def test_any_numbers_fit_the_axes(paper: Any, values: list[float]) -> None:
     paper.put("one", "small", values)
     paper.put("other", "small", [value + 100 for value in values])
@@ -152,16 +149,15 @@ def test_any_numbers_fit_the_axes(paper: Any, values: list[float]) -> None:
     assert collisions(drawing) == []
 
 
-@pytest.mark.parametrize("ending", ["png", "svg", "csv"])
 def test_the_same_trials_give_the_same_bytes_whatever_style_the_user_has_set(
-    paper: Any, ending: str, monkeypatch: pytest.MonkeyPatch
+    paper: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     paper.put("one", "small", [i / 10 for i in range(10)])
     paper.put("other", "small", [1 + i / 10 for i in range(8)])
-    first = contents(paper.draw(_levels(PUBLISHED)))[ending]
+    first = contents(paper.draw(_levels(PUBLISHED)))
     with mpl.rc_context({"font.size": 30, "svg.hashsalt": None, "axes.grid": True, "axes.facecolor": "black"}):
         monkeypatch.setenv("SOURCE_DATE_EPOCH", "1")
-        assert contents(paper.draw(_levels(PUBLISHED)))[ending] == first
+        assert contents(paper.draw(_levels(PUBLISHED))) == first
         assert mpl.rcParams["font.size"] == 30
 
 
@@ -172,43 +168,3 @@ def test_hostile_text_is_text(paper: Any) -> None:
     drawing = paper.draw(BarChart((panel,)))
     assert words(drawing).count(nasty) == 3
     assert b"<script>" not in contents(drawing)["svg"]
-
-
-def test_the_csv_reads_back_to_the_last_digit(paper: Any) -> None:
-    import io
-
-    import pandas as pd
-
-    paper.put("one", "small", [1 / 3, 2 / 7])
-    drawing = paper.draw(_rewards())
-    again = pd.read_csv(io.StringIO(contents(drawing)["csv"].decode()))
-    trials = again[(again["what"] == "trial") & (again["series"] == "The One")]
-    assert list(trials["value"].dropna()) == [10 * (1 / 3), 10 * (2 / 7)]
-
-
-def test_the_legend_has_lines_enough_above_the_panels(paper: Any) -> None:
-    series = tuple(Series("one", f"The One, for the time number {i}", "#0072b2") for i in range(9))
-    drawing = paper.draw(BarChart((compared(*REWARD[:2], series, {"place": "small"}, SILENT, ylabel="reward"),)))
-    box = drawing.figure.legends[0].get_window_extent()
-    assert box.y0 > drawing.figure.axes[0].get_window_extent().y1
-    assert box.x1 < drawing.figure.bbox.x1
-    assert collisions(drawing) == []
-
-
-def test_brackets_make_a_panel_higher_and_squeeze_nothing(paper: Any) -> None:
-    paper.put("one", "small", [0.5] * 10)
-    paper.put("other", "small", [0.5] * 10)
-    flat = paper.draw(_levels())
-    for method, shift in (("one", 0.5), ("other", 0.9)):
-        paper.put(method, "large", [shift + i / 100 for i in range(10)])
-    bracketed = paper.draw(_levels(task="large"))
-
-    def inches(drawing: Drawing) -> float:
-        axis = drawing.figure.axes[0]
-        low, high = axis.get_ylim()
-        height: float = axis.get_position().height * drawing.figure.get_figheight()
-        return height / (high - low)
-
-    spans = [drawing.figure.axes[0].get_ylim()[1] for drawing in (flat, bracketed)]
-    assert spans[1] > spans[0]
-    assert inches(bracketed) == pytest.approx(inches(flat), rel=0.05)

@@ -47,11 +47,6 @@ def test_what_has_not_run_is_compared_with_nothing() -> None:
     assert compare([[1.0, 2.0], []], [[0, 1]]) == ()
 
 
-def test_only_members_of_a_family_are_compared() -> None:
-    samples = [[float(i), i + 0.5] for i in range(4)]
-    assert [(c.left, c.right) for c in compare(samples, [[0, 1], [2, 3]])] == [(0, 1), (2, 3)]
-
-
 def test_constant_and_infinitely_bad_samples_are_compared_without_a_warning() -> None:
     ((same),) = compare([[1.0] * 3, [1.0] * 3], [[0, 1]])
     assert (same.p, same.overall, same.asterisks) == (1.0, 1.0, "")

@@ -78,15 +78,6 @@ def test_without_a_stored_champion_the_figure_says_so_and_tells_the_records(mapp
     assert drawing.shown == 4
 
 
-def test_a_torn_champion_is_an_error_that_names_the_file(mapped: Any) -> None:
-    result = made(MAZE, 2, 60.0)
-    mapped.store.put(replace(result, curves={"coverage": (1.0,)}), _champion())
-    path = mapped.store.champion_path(result.id)
-    path.write_bytes(path.read_bytes()[:-30])
-    with pytest.raises(UserError, match=f"Cannot use {path}"):
-        mapped.draw(ELITES)
-
-
 def test_only_a_maze_has_a_map(paper: Any) -> None:
     with pytest.raises(UserError, match="needs the area of a maze; 'small' is not a maze"):
         paper.draw(ElitesMap((Ground("no maze", "one", "small"),), ()))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from small_paper import CONDITIONS, Paper, made
@@ -124,7 +123,3 @@ def test_without_the_number_of_published_trials_nothing_can_be_said(reporting: P
     path = reporting.reproduction.folder / "reported.toml"
     path.write_text(REPORTED.replace("trials = 10\n", ""))
     assert {one.repetition.answer for one in _found(reporting).values()} == {Answer.UNKNOWN}
-
-
-def test_a_paper_without_published_numbers_has_none(paper: Paper, tmp_path: Path) -> None:
-    assert _found(paper) == {}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import pytest
@@ -14,12 +16,19 @@ from evoclaims.trials.store import Store
 from reproductions.nisioti2025 import REPRODUCTION
 
 FIGURES = figure.names(REPRODUCTION)
+Draw = Callable[[str, str], Drawing]
 
 
 @pytest.fixture(scope="module")
 def archive(tmp_path_factory: pytest.TempPathFactory) -> Archive:
     """The committed trials, and an empty store."""
     return Archive(Store(tmp_path_factory.mktemp("figures") / "store"), REPRODUCTION.references)
+
+
+@pytest.fixture(scope="module")
+def draw(archive: Archive) -> Draw:
+    """A function that draws a figure at a tier, each once."""
+    return cache(lambda name, tier: figure.load(REPRODUCTION, name).draw(archive, REPRODUCTION, tier))
 
 
 def _trials(drawing: Drawing) -> set[Any]:
@@ -29,21 +38,21 @@ def _trials(drawing: Drawing) -> set[Any]:
 
 @pytest.mark.parametrize("tier", ["full", "smoke"])
 @pytest.mark.parametrize("name", FIGURES)
-def test_a_figure_draws_and_its_words_do_not_collide(archive: Archive, name: str, tier: str) -> None:
-    drawing = figure.load(REPRODUCTION, name).draw(archive, REPRODUCTION, tier)
+def test_a_figure_draws_and_its_words_do_not_collide(draw: Draw, name: str, tier: str) -> None:
+    drawing = draw(name, tier)
     assert collisions(drawing) == []
     assert len(drawing.table) > 0
 
 
 @pytest.mark.parametrize("tier", ["full", "smoke"])
-def test_the_gates_figures_show_every_committed_trial(archive: Archive, tier: str) -> None:
+def test_the_gates_figures_show_every_committed_trial(archive: Archive, draw: Draw, tier: str) -> None:
     conditions = REPRODUCTION.tier(tier).conditions
     shown = {
         "fig3": [(m, t) for m in ("neat", "hyperneat", "cma_es", "ppo") for t in ("n_parity", "simple_alu")],
         "fig4": [(m, t) for m in ("neat", "ppo") for t in ("n_parity", "n_parity_direct")],
     }
     for name, names in shown.items():
-        drawing = figure.load(REPRODUCTION, name).draw(archive, REPRODUCTION, tier)
+        drawing = draw(name, tier)
         committed = [trial for pair in names for trial in archive.trials(conditions[pair], range(10))]
         assert _trials(drawing) == {trial.id for trial in committed if trial is not None} != set()
         complete = tier == "full"  # smoke has trials of the conditions that its claims read

@@ -39,13 +39,6 @@ def test_a_verdict_shows_as_letter_word_and_exit_status(
     assert re.fullmatch(rf"=+ 1 deselected, 1 {word} in .*s =+", result.outlines[-1])
 
 
-def test_every_outcome_keeps_its_own_letter_side_by_side(project: Any) -> None:
-    project.write(a="supported", b="refuted", c="undecided")
-    result = project.run()
-    assert (result.ret, _letters(result)) == (1, "✓✗?")
-    result.stdout.fnmatch_lines(["claims: 1 supported, 1 refuted, 1 inconclusive"])
-
-
 def test_the_words_of_a_verbose_run_are_the_outcomes(project: Any) -> None:
     project.write(a="supported", b="undecided")
     project.run()  # of trials that are stored there is no progress to tell between a test's name and its outcome

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from textwrap import indent
 from typing import Any
 
 import pytest
@@ -51,12 +52,13 @@ def test_a_selection_leaves_the_claims_of_the_tiers_it_names(
 
 def test_one_case_of_a_claim_is_selected_by_its_name(project: Any, sentence: Sentence) -> None:
     project.write(
-        "@says('a')\n@pytest.mark.parametrize('case', ['x', 'y'])\ndef test_a(case, trials, verdict):\n    pass\n"
+        "@says('a')\n@pytest.mark.parametrize('case', ['x,y', 'y'])\ndef test_a(case, trials, verdict):\n    pass\n"
     )
-    chosen = project.run("--collect-only", "-q", "--claims-only=a[y]")
-    assert [line for line in chosen.outlines if "::" in line] == ["claims/test_claims.py::test_a[y-a-smoke]"]
+    for case in ("x,y", "y"):
+        chosen = project.run("--collect-only", "-q", f"--claims-only=a[{case}]")
+        assert [line for line in chosen.outlines if "::" in line] == [f"claims/test_claims.py::test_a[{case}-a-smoke]"]
     sentence(
-        project.run("--claims-only=a[z]"), "There is no claim named 'a[z]'. Did you mean 'a[y]'? Known: a[x], a[y]."
+        project.run("--claims-only=a[z]"), "There is no claim named 'a[z]'. Did you mean 'a[y]'? Known: a[x,y], a[y]."
     )
     project.write(a="supported")
     sentence(project.run("--claims-only=a[x]"), "There is no claim named 'a[x]'. Known: a.")
@@ -129,7 +131,6 @@ def test_the_full_tier_judges_the_papers_own_sentence(project: Any) -> None:
     [
         (("--claims-only", "G1"), "There is no claim named 'G1'. Known: first, second."),
         (("--claims-only", "first,secnd"), "no claim named 'secnd'. Did you mean 'second'? Known: first, second."),
-        (("--claims-undecided", "maybe"), "argument --claims-undecided: invalid choice: 'maybe'"),
     ],
 )
 def test_an_unknown_name_ends_the_run_with_a_sentence_before_any_trial(
@@ -157,13 +158,6 @@ def test_parameters_multiply_with_tiers_and_name_the_case(project: Any) -> None:
     }
 
 
-def test_a_claim_that_takes_no_verdict_is_a_sentence(project: Any, sentence: Sentence) -> None:
-    project.write("@says('a')\ndef test_a():\n    pass\n")
-    result = project.run()
-    assert result.ret == pytest.ExitCode.INTERRUPTED
-    sentence(result, "test_a is a claim but takes neither the fixture `trials` nor `verdict`.")
-
-
 def test_the_fixtures_are_refused_to_tests_that_are_no_claims(project: Any) -> None:
     project.write("def test_a(trials):\n    pass\n")
     result = project.run()
@@ -171,27 +165,35 @@ def test_the_fixtures_are_refused_to_tests_that_are_no_claims(project: Any) -> N
     result.stdout.fnmatch_lines(["*UserError: The fixtures `trials` and `verdict` are for tests marked with @claim*"])
 
 
-@pytest.mark.parametrize("indent", [("", ""), ("class TestThem:\n", "    ")])
-def test_a_claim_that_pytest_takes_for_no_test_is_a_sentence(
-    project: Any, sentence: Sentence, indent: tuple[str, str]
+CHECK = "@says('a')\ndef check_a(trials, verdict):\n    pass\n"
+TWO = "@says('a')\ndef test_it(trials, verdict):\n    pass\n\n@says('b')\ndef test_it(trials, verdict):\n    pass\n"
+CLASS = """
+class Stones:
+    @says("a")
+    def test_a(self, trials, verdict):
+        verdict(trials("right", on="parity").solves_every_level.in_most_trials())
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (CHECK, "the function check_a has @claim(...), and pytest takes none of this name for a test, so that"),
+        (TWO, "The tests of the claims a and b have one name, test_it, so that the second replaces the first"),
+        (CLASS, "the class Stones has a function with @claim(...), and pytest takes none of this name for one of"),
+    ],
+)
+def test_a_claim_that_would_not_be_collected_is_a_sentence(
+    project: Any, sentence: Sentence, text: str, said: str
 ) -> None:
-    first, before = indent
-    claimed = f"{first}{before}@says('a')\n{before}def check_a(trials, verdict):\n{before}    pass\n"
-    project.write(f"{claimed}\ndef test_other():\n    pass\n")
-    result = project.run()
-    assert result.ret == pytest.ExitCode.INTERRUPTED
-    sentence(result, "the function check_a has @claim(...), and pytest takes none of this name for a test, so that")
-    (project.path / "pyproject.toml").write_text(PYPROJECT + 'python_functions = "check"\n')
-    assert "a" in {report["claim"] for report in project.json()["claims"]}
-
-
-@pytest.mark.parametrize("before", ["", "    "])
-def test_a_claim_that_another_of_its_name_replaces_is_a_sentence(project: Any, sentence: Sentence, before: str) -> None:
-    two = [f"{before}@says('{name}')\n{before}def test_it(trials, verdict):\n{before}    pass\n" for name in "ab"]
-    project.write("class TestThem:\n" * bool(before) + "\n".join(two))
-    result = project.run()
-    assert result.ret == pytest.ExitCode.INTERRUPTED
-    sentence(result, "The tests of the claims a and b have one name, test_it, so that the second replaces the first")
+    for shown in (text, f"class TestThem:\n{indent(text, '    ')}"):
+        project.write(f"{shown}\ndef test_other():\n    pass\n")
+        result = project.run()
+        assert result.ret == pytest.ExitCode.INTERRUPTED
+        sentence(result, said)
+    if text == CHECK:
+        (project.path / "pyproject.toml").write_text(PYPROJECT + 'python_functions = "check"\n')
+        assert "a" in {report["claim"] for report in project.json()["claims"]}
 
 
 def test_claims_in_a_file_that_pytest_takes_for_none_of_tests_are_a_sentence(project: Any, sentence: Sentence) -> None:
@@ -205,13 +207,6 @@ def test_claims_in_a_file_that_pytest_takes_for_none_of_tests_are_a_sentence(pro
     sentence(result, "more.py has a test with @claim(...), and pytest takes no file of this name for one of tests")
 
 
-def test_a_claim_without_a_text_is_a_sentence_at_collection(project: Any) -> None:
-    project.write("@claim('a', says='x', where='', smoke='y')\ndef test_a(trials, verdict):\n    pass\n")
-    result = project.run()
-    assert result.ret == pytest.ExitCode.INTERRUPTED
-    result.stdout.fnmatch_lines(["*UserError: The claim a lacks its where.*"])
-
-
 def test_tests_without_claims_are_left_alone(project: Any) -> None:
     project.write("def test_a():\n    pass\n")
     result = project.run(own_store=True)
@@ -219,29 +214,6 @@ def test_tests_without_claims_are_left_alone(project: Any) -> None:
     result.assert_outcomes(passed=1)
     result.stdout.no_fnmatch_line("*claims:*")
     assert not (project.path / ".evoclaims").exists()
-
-
-def test_a_case_whose_parameters_have_a_comma_is_selected_by_its_name(project: Any) -> None:
-    project.write(
-        "@says('a')\n@pytest.mark.parametrize('case', ['x,y', 'z'])\ndef test_a(case, trials, verdict):\n    pass\n"
-    )
-    chosen = project.run("--collect-only", "-q", "--claims-only=a[x,y]")
-    assert [line for line in chosen.outlines if "::" in line] == ["claims/test_claims.py::test_a[x,y-a-smoke]"]
-
-
-CLASS = """
-class Stones:
-    @says("a")
-    def test_a(self, trials, verdict):
-        verdict(trials("right", on="parity").solves_every_level.in_most_trials())
-"""
-
-
-def test_a_claim_in_a_class_that_is_none_of_tests_is_refused(project: Any, sentence: Any) -> None:
-    project.write(CLASS)
-    result = project.run()
-    assert result.ret == pytest.ExitCode.INTERRUPTED
-    sentence(result, "the class Stones has a function with @claim(...), and pytest takes none of this name for one of")
 
 
 @pytest.mark.parametrize("more", ["    __test__ = False\n", "\nclass TestStones(Stones):\n    pass\n"])

@@ -91,20 +91,12 @@ def test_a_process_that_dies_over_the_only_claim_is_an_error_too(project: Any) -
     )
 
 
-@pytest.mark.parametrize(
-    ("claims", "paper", "text"),
-    [
-        ({"a": "supported"}, "def f(:\n", "which [tool.evoclaims] names, does not import: SyntaxError: invalid syntax"),
-        ({"a": "supported", "b": "supported"}, "", "There is no claim named 'nope'. Known: a, b."),
-    ],
-)
-def test_what_keeps_workers_from_beginning_is_one_sentence_of_the_controllers(
-    project: Any, sentence: Any, claims: dict[str, str], paper: str, text: str
-) -> None:
-    project.write(**claims)
+def test_what_keeps_workers_from_beginning_is_one_sentence_of_the_controllers(project: Any, sentence: Any) -> None:
+    project.write(a="supported")
     with (project.path / "tiny_paper.py").open("a") as file:
-        file.write(paper)
-    result = project.run(*(["-n2"] if paper else ["-n1", "--claims-only=nope"]), own_store=True)
+        file.write("def f(:\n")
+    result = project.run("-n2", own_store=True)
+    text = "which [tool.evoclaims] names, does not import: SyntaxError: invalid syntax"
     assert result.ret == pytest.ExitCode.USAGE_ERROR
     sentence(result, text)
     assert " ".join(result.stdout.str().split()).count(text) == 1

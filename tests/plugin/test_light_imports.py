@@ -8,8 +8,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 ROOT = Path(__file__).parents[2]
 HEAVY = [
     *("brax", "evosax", "flax", "jax", "matplotlib", "mujoco", "mujoco.mjx", "numpy"),
@@ -27,12 +25,9 @@ def _imported(code: str, folder: Path) -> set[str]:
     return set(ast.literal_eval(done.stdout.splitlines()[-1].strip()))
 
 
-@pytest.mark.parametrize(
-    "code",
-    ["import evoclaims", "import evoclaims.methods, evoclaims.methods.neat, evoclaims.envs, evoclaims.networks"],
-)
-def test_a_package_is_imported_without_what_its_names_need(tmp_path: Path, code: str) -> None:
-    assert _imported(code, tmp_path) == set()
+def test_a_package_is_imported_without_what_its_names_need(tmp_path: Path) -> None:
+    packages = "evoclaims, evoclaims.methods, evoclaims.methods.neat, evoclaims.envs, evoclaims.networks"
+    assert _imported(f"import {packages}", tmp_path) == set()
 
 
 def test_a_project_without_claims_pays_nothing_for_the_plugin(tmp_path: Path) -> None:
@@ -42,16 +37,7 @@ def test_a_project_without_claims_pays_nothing_for_the_plugin(tmp_path: Path) ->
 
 
 def test_claims_are_collected_without_their_reproduction() -> None:
-    options = [
-        "-p",
-        "evoclaims.plugin.hooks",
-        "-p",
-        "no:cacheprovider",
-        "-c",
-        os.devnull,
-        "--rootdir=.",
-        "--collect-only",
-    ]
+    options = ["-pevoclaims.plugin.hooks", "-pno:cacheprovider", "-c", os.devnull, "--rootdir=.", "--collect-only"]
     code = f"import pytest; status = pytest.main({[*options, 'claims']})"
     assert _imported(f"{code}\nassert status == 0", ROOT) <= {"numpy"}
 

@@ -65,7 +65,6 @@ def test_claims_whose_trials_are_there_come_first_and_other_tests_keep_their_pla
 def test_an_option_that_asks_for_another_order_of_tests_has_it(project: Any, stored: Any) -> None:
     project.write(CLAIMS.replace(".greater(", ".__gt__("))
     for option in ("--failed-first", "--new-first", "--stepwise"):
-        assert order(project.run("-v", option, "--collect-only", own_store=True)) == []
         assert order(project.run("-v", option, own_store=True))[0] == "coin", option
 
 

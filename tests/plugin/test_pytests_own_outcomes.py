@@ -43,17 +43,13 @@ def test_a(broken, trials, verdict):
 """
 
 
-@pytest.mark.parametrize("workers", [(), ("-n1",)])
-def test_an_accepted_error_of_a_fixture_is_reported_once(project: Any, workers: tuple[str, ...]) -> None:
+def test_an_accepted_error_of_a_fixture_is_reported_once(project: Any, capsys: Any) -> None:
     project.write(FIXTURE)
-    result = project.run("--claims-json=out.json", "--junitxml=out.xml", *workers)
+    result = project.run("--claims-json=out.json", "--junitxml=out.xml")
     assert _outcomes(project) == ["error"]
     result.stdout.fnmatch_lines(["claims: 1 error", "*1 error (accepted) in *"])
     assert "KeyError" not in result.stdout.str()
-
-
-def test_an_accepted_error_of_a_fixture_is_one_row_of_the_status(project: Any, capsys: Any) -> None:
-    project.write(FIXTURE)
+    capsys.readouterr()
     main(["status", "--tier=smoke", f"--storage={project.store}", "--as=csv"])
     assert [line.partition(",")[0] for line in capsys.readouterr().out.splitlines()[1:]] == ["a"]
 

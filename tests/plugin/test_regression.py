@@ -24,11 +24,6 @@ Sentence = Callable[[pytest.RunResult, str], None]
 ALMOST = "verdict(trials('right', on='parity').solves_every_level.in_most_trials(p0=0.6))"
 
 
-@pytest.fixture(autouse=True)
-def _no_page(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv("GITHUB_STEP_SUMMARY", raising=False)
-
-
 @pytest.fixture
 def accepted(project: Any, kept: Path) -> Any:
     """The project with two claims whose verdicts are accepted."""
@@ -46,13 +41,6 @@ def _edit(**changes: Any) -> None:
     path = Path("verdicts.toml")
     kept = history.load(path)
     path.write_text(history.dump({**kept, ("smoke", "a"): (replace(kept["smoke", "a"][0], **changes),)}))
-
-
-def test_without_accepted_verdicts_nothing_is_said_of_them(project: Any) -> None:
-    project.write(a="supported")
-    result = project.run()
-    assert result.ret == 0
-    result.stdout.no_fnmatch_line("*accepted verdicts*")
 
 
 def test_verdicts_as_accepted_are_one_line(accepted: Any) -> None:
@@ -160,11 +148,6 @@ def test_reasons_that_cannot_be_found_are_an_error_after_the_verdicts(
     assert result.ret == 1
     sentence(result, "error: The disk is gone.")
     result.stdout.fnmatch_lines(["a (smoke): refuted -> supported", "changed: a (smoke)"])
-
-
-def test_claims_that_a_run_leaves_out_are_not_gone(accepted: Any) -> None:
-    result = accepted.run("--claims-only=a")
-    result.stdout.fnmatch_lines(["against the accepted verdicts: 1 the same"])
 
 
 def test_an_accepted_claim_that_is_gone_is_listed_by_a_run_of_all_claims(accepted: Any) -> None:

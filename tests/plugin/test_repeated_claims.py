@@ -161,11 +161,3 @@ def test_claim_repeated_on_workers_is_counted_once(project: Any) -> None:
     result.stdout.fnmatch_lines(["claims: 1 supported, 1 refuted"])
     claims = json.loads((project.path / "out.json").read_text())["claims"]
     assert [(claim["claim"], claim["outcome"]) for claim in claims] == [("a", "supported"), ("b", "refuted")]
-
-
-def test_functions_with_the_same_claim_are_no_repetition(project: Any) -> None:
-    project.write(CLAIMS + CLAIMS.replace("def test_", "def test_other_"))
-    (project.path / "conftest.py").write_text(PARAMETERS.replace("HOW", "trylast=True").replace("INDIRECT", "True"))
-    result = project.run()
-    assert result.ret == pytest.ExitCode.USAGE_ERROR
-    result.stderr.fnmatch_lines(["ERROR: Two claim tests at the smoke tier are called a: *"])

@@ -96,44 +96,6 @@ def test_a_fresh_clone_has_no_store_yet_and_that_is_no_mistake(project: Any) -> 
     assert main(["verify"]) == 0
 
 
-READING = (
-    ("verify",),
-    ("status",),
-    ("plan",),
-    ("export",),
-    ("compare",),
-    ("accept",),
-    ("report",),
-    ("reference",),
-    ("reproduce", "all"),
-    ("champion", "right", "--on=parity"),
-)
-
-
-@pytest.mark.parametrize(("storage", "text"), [("mistyped", "does not exist"), ("", "names no folder")])
-@pytest.mark.parametrize("command", READING)
-def test_a_command_that_only_reads_refuses_a_store_that_is_not_there(
-    project: Any, capsys: pytest.CaptureFixture[str], command: tuple[str, ...], storage: str, text: str
-) -> None:
-    project.write(a="supported")
-    before = sorted(project.path.iterdir())
-    assert main([*command, f"--storage={storage}"]) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert text in err
-    assert len(err.splitlines()) == 1
-    assert sorted(project.path.iterdir()) == before
-
-
-def test_verify_moves_nothing_in_a_folder_that_is_no_store(project: Any, capsys: pytest.CaptureFixture[str]) -> None:
-    home = project.path / "home" / "trials" / "of_my_life"
-    home.mkdir(parents=True)
-    (home / "photo.jpg").write_text("precious")
-    assert main(["verify", f"--storage={project.path / 'home'}"]) == 2
-    assert "is not a trial store" in capsys.readouterr().err
-    assert [path.name for path in (project.path / "home").rglob("*")] == ["trials", "of_my_life", "photo.jpg"]
-
-
 @pytest.fixture
 def read_only(monkeypatch: pytest.MonkeyPatch) -> Callable[[Path], None]:
     """A function that makes a folder behave as on a read-only disk, also for those who may do everything."""
@@ -187,17 +149,3 @@ def test_a_store_on_a_read_only_disk_that_lacks_trials_is_a_sentence(
     assert result.ret == 1
     sentence(result, "Read-only file system")
     result.stdout.fnmatch_lines(["claims: 1 supported, 1 error"])
-
-
-def test_names_of_three_hundred_characters_have_files_of_their_own(project: Any) -> None:
-    long = "a" * 300
-    project.write(
-        "@pytest.mark.parametrize('which', ['" + long + "1', '" + long + "2'])\n"
-        "@says('" + long + "')\n"
-        "def test_long(trials, verdict, which):\n"
-        "    verdict(trials('right', on='parity').solves_every_level.in_most_trials())\n"
-    )
-    result = project.run(own_store=True)
-    assert result.ret == 0
-    result.stdout.no_fnmatch_line("warning: *")
-    assert len(list((project.path / ".evoclaims" / "verdicts" / "smoke").iterdir())) == 2

@@ -9,12 +9,9 @@ import pytest
 ENGINE = "*trials?runner.py:*"
 
 
-@pytest.mark.parametrize("workers", [(), ("-n1",)])
-def test_of_an_error_in_a_method_the_projects_lines_are_shown_and_not_the_engines(
-    project: Any, workers: tuple[str, ...]
-) -> None:
+def test_of_an_error_in_a_method_the_projects_lines_are_shown_and_not_the_engines(project: Any) -> None:
     project.write(a="error")
-    result = project.run(*workers)
+    result = project.run()
     result.stdout.fnmatch_lines(
         ['>*raise RuntimeError("out of order")', "E*RuntimeError: out of order", "tiny_paper.py:*: RuntimeError"]
     )

@@ -87,6 +87,11 @@ def test_trials_of_other_versions_run_again_and_the_summary_says_what_that_chang
     told = json.loads((project.path / "out.json").read_text())["upgrade"]["conditions"]
     assert [(one["condition"], one["again"], one["changed"]) for one in told] == [("right on parity (smoke)", 10, 10)]
     assert [(one["old"]["numpy"], one["new"]["numpy"]) for one in told] == [("1.0", HERE)]
+    again = project.run(own_store=True)
+    assert again.ret == 0
+    lines = _lines(again)
+    assert "right on parity (smoke): run again before, 10 of 10 not the same to the bit as before" in lines
+    assert not [line for line in lines if "compiling" in line]
 
 
 def test_trials_that_other_processes_ran_again_before_their_claim_was_due_count_as_such(
@@ -96,20 +101,10 @@ def test_trials_that_other_processes_ran_again_before_their_claim_was_due_count_
     aged(10)
     file = project.path / "claims" / "test_claims.py"
     file.write_text(file.read_text() + LATE)
-    result = project.run_apart("--claims-processes=2")
+    result = project.run("--claims-processes=2", own_store=True)
     lines = _lines(result)
     assert "right on parity (smoke): 10 trials run again, 10 of 10 not the same to the bit as before" in lines
     assert result.ret == 1
-
-
-def test_the_run_after_that_runs_nothing_and_passes(project: Any, aged: Callable[..., None]) -> None:
-    aged(10)
-    project.run(own_store=True)
-    result = project.run(own_store=True)
-    assert result.ret == 0
-    lines = _lines(result)
-    assert "right on parity (smoke): run again before, 10 of 10 not the same to the bit as before" in lines
-    assert not [line for line in lines if "compiling" in line]
 
 
 def test_a_part_of_a_conditions_trials_runs_again_alone(project: Any, aged: Callable[..., None]) -> None:
@@ -136,13 +131,12 @@ def test_bits_are_not_said_to_be_unchanged_where_versions_differ(project: Any, a
     result.stdout.fnmatch_lines(["DRIFT in right on parity (smoke): mean_success is higher now*", sentence])
 
 
-@pytest.mark.parametrize("option", ["--claims-any-version", "--claims-stored"])
 def test_whatever_is_there_is_judged_and_the_table_says_that_its_versions_are_mixed(
-    project: Any, aged: Callable[..., None], option: str, monkeypatch: pytest.MonkeyPatch
+    project: Any, aged: Callable[..., None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     aged(5)
     monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(project.path / "page.md"))
-    result = project.run(option, own_store=True)
+    result = project.run("--claims-any-version", own_store=True)
     lines = _lines(result)
     assert f"† trials of mixed versions: numpy 1.0 and {HERE}: a (smoke)" in lines
     assert any("inconclusive†" in line for line in lines)

@@ -129,12 +129,6 @@ def better_wins(group: Callable[[str], Any]) -> Assertion:
     return above
 
 
-def neat_solves(group: Callable[[str], Any]) -> Assertion:
-    """Claim that NEAT solves the task."""
-    solved: Assertion = group("neat").solves_every_level.in_most_trials()
-    return solved
-
-
 def better_solves(group: Callable[[str], Any]) -> Assertion:
     """Claim that a method solves the task."""
     solved: Assertion = group("better").solves_every_level.in_most_trials()

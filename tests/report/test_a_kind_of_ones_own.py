@@ -55,14 +55,3 @@ def test_a_new_kind_is_judged_and_shown_in_every_form(filled: Laboratory) -> Non
     assert "the median of better on small: mean success over levels is at least 0.6" in shown
     assert "least: 0.6" in shown
     assert "<dt>p against the claim</dt><dd>0.016</dd>" in shown
-
-
-def test_a_new_kind_joins_others(filled: Laboratory) -> None:
-    report = filled.judge(
-        lambda group: (
-            AtLeast(group("worse").mean_success, 0.6) & (group("better").mean_success > group("worse").mean_success)
-        )
-    )
-    assert report.outcome == "refuted"
-    assert report.verdict is not None
-    assert report.verdict.deciding_part is report.verdict.evidence[0]

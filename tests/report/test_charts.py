@@ -47,12 +47,6 @@ def test_every_trial_is_a_dot_with_its_seed_and_value() -> None:
     assert svg.get("aria-label") == "a on b: x, 3 trials, median 0.5"
 
 
-def test_dots_lie_where_their_values_are_on_the_axis() -> None:
-    part = _part(0.0, 0.5, 1.0)
-    places = [float(circle.get("cx", "")) for circle in _drawn(part).iter("circle")]
-    assert places == pytest.approx([24.0, WIDTH / 2, WIDTH - 24.0], abs=0.1)
-
-
 def test_equal_values_share_a_block_around_their_place_and_overlap_nowhere() -> None:
     circles = list(_drawn(_part(*[1.0] * 40)).iter("circle"))
     x = [float(circle.get("cx", "")) for circle in circles]

@@ -8,8 +8,6 @@ from typing import Any
 
 import pytest
 from hand_made_verdicts import evidence, verdict
-from laboratory import Laboratory, better_wins
-from unpacked import whole
 
 from evoclaims.judging.sample import Sample
 from evoclaims.report.charts import strip_svg
@@ -38,12 +36,9 @@ def test_each_condition_has_its_interquartile_mean() -> None:
     assert numbers(part)["IQM of b on t"] == "3 (95% stratified bootstrap 3 to 3)"
 
 
-def test_levels_of_one_condition_are_told_apart() -> None:
+def test_levels_of_one_condition_are_told_apart_and_events_have_no_mean() -> None:
     part = part_of(sample("a on t: x at level 0", 0.0, 1.0), sample("a on t: x at level 1", 1.0, 1.0))
     assert {"IQM of a on t: x at level 0", "IQM of a on t: x at level 1"} < set(numbers(part))
-
-
-def test_events_have_neither() -> None:
     part = part_of(sample("a on t: x", 0.0, 1.0), sample("b on t: x", 1.0, 1.0), events=True)
     assert not any("IQM" in name for name in numbers(part))
 
@@ -70,20 +65,3 @@ def test_what_is_not_observed_is_said_to_be_more(values: tuple[float, ...], said
 def test_a_trial_that_failed_is_no_trial_that_never_got_there() -> None:
     broken = replace(sample("a: x", 1.0, INF, INF, limit=9.0), failed=(2,), endings=("diverged",))
     assert dict(part_of(broken).strips[0].apart) == {1: "> 9", 2: "diverged"}
-
-
-def test_a_claims_evidence_shows_both(filled: Laboratory) -> None:
-    page = filled.page(filled.judge(better_wins))
-    assert "IQM of better on small" in whole(page)
-    assert "IQM of worse on small" in whole(page)
-
-
-def test_description_decides_nothing(filled: Laboratory, monkeypatch: pytest.MonkeyPatch) -> None:
-    before = filled.judge(better_wins)
-
-    def broken(*_: Any, **__: Any) -> Any:
-        raise AssertionError("used by the judge")
-
-    for name in ("iqm", "iqm_interval"):
-        monkeypatch.setattr(f"evoclaims.judging.effect.{name}", broken)
-    assert filled.judge(better_wins) == before

@@ -36,10 +36,9 @@ def test_a_band_shows_its_ends_and_the_interval_of_the_median(shown: Any) -> Non
     assert part.event is False
 
 
-@pytest.mark.parametrize("p0", [0.7, 0.5])
-def test_an_event_shows_the_probability_that_it_is_held_against(shown: Any, p0: float) -> None:
-    part = shown(lambda group: group.solves_every_level.in_most_trials(p0))
-    assert part.bounds == (Bound("p0", p0),)
+def test_an_event_shows_the_probability_that_it_is_held_against(shown: Any) -> None:
+    part = shown(lambda group: group.solves_every_level.in_most_trials(0.7))
+    assert part.bounds == (Bound("p0", 0.7),)
     assert part.event is True
     assert [span.of for span in part.spans] == ["P(event), Clopper-Pearson, each end at 0.05"]
 

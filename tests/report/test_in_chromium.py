@@ -153,21 +153,6 @@ def test_a_page_whose_pieces_are_damaged_says_so(browser: Chromium, address: str
     assert browser.evaluate("document.querySelector('#unpackable').checkVisibility()")
 
 
-def test_hostile_text_runs_nothing(browser: Chromium, address: str) -> None:
-    browser.open(address)
-    assert browser.evaluate("document.title") == "Claims of tiny"
-    assert "<script>" in browser.evaluate("document.querySelector('#G1-full blockquote').textContent")
-
-
-def test_a_script_that_is_not_the_pages_own_is_refused(browser: Chromium, address: str) -> None:
-    browser.open(address)
-    browser.evaluate(
-        "document.body.append(Object.assign(document.createElement('script'), {textContent: 'window.broken = 1'}))"
-    )
-    assert browser.evaluate("window.broken") is None
-    assert any("Content Security Policy" in complaint for complaint in browser.complaints)
-
-
 def test_every_image_loads(browser: Chromium, address: str) -> None:
     browser.open(f"{address}#figures")
     _open_all(browser)
@@ -179,14 +164,6 @@ def test_every_image_loads(browser: Chromium, address: str) -> None:
     assert [name for name, *_ in images] == [""]
     assert all(complete and width > 0 for _, complete, width in images)
     assert images[-1] == ["", True, 40]
-
-
-def test_curves_are_drawn_for_every_claim_that_shows_them(browser: Chromium, address: str) -> None:
-    browser.open(f"{address}#G1-full")
-    _open_all(browser)
-    for claim in ("G1-full", "G2-smoke"):
-        curves = f"[...document.querySelectorAll('#{claim} .curves svg')]"
-        assert browser.evaluate(f"{curves}.map(one => one.getBoundingClientRect().width > 50)") == [True] * 2
 
 
 @pytest.mark.parametrize(
@@ -246,15 +223,6 @@ def test_sentences_are_whole_at_1280_pixels_and_variants_are_shown_on_demand(bro
     assert browser.evaluate(seen) == 1
 
 
-def test_each_row_of_verdicts_is_labelled_at_400_pixels(browser: Chromium, address: str) -> None:
-    browser.open(address, width=400)
-    labels = browser.evaluate(
-        "[...document.querySelectorAll('.entry .verdicts')].filter(one => one.checkVisibility())"
-        ".map(one => getComputedStyle(one, '::before').content)"
-    )
-    assert labels == [*['"full"', '"smoke"'] * 4, '"full"']
-
-
 def test_a_link_to_a_claim_shows_it_whatever_the_filters_say(browser: Chromium, address: str) -> None:
     browser.open(f"{address}#?verdict=refuted")
     browser.evaluate("document.querySelector('[data-for=S2-smoke]').click()")
@@ -268,8 +236,7 @@ def test_a_link_to_a_claim_shows_it_whatever_the_filters_say(browser: Chromium, 
     assert _visible(browser) == ["G2-full", "G2-smoke"]
 
 
-@pytest.mark.parametrize("width", [320, 390, 1280])
-@pytest.mark.parametrize("dark", [False, True])
+@pytest.mark.parametrize(("width", "dark"), [(320, False), (320, True), (1280, False)])
 def test_the_page_fits_its_window_and_follows_the_colour_scheme(
     browser: Chromium, address: str, width: int, dark: bool
 ) -> None:

@@ -123,15 +123,9 @@ def test_a_log_gets_a_line_a_minute_and_remarks_at_once() -> None:
         screen.line(report)
         assert screen.text.count("\n  ") == lines
         screen.line.close()  # a verdict was written meanwhile
+    assert screen.text.startswith(f"\n  {describe(WAITING)}\n")
     assert "\r" not in screen.text
     assert screen.text.endswith("\n")
-
-
-def test_a_log_begins_on_a_line_of_its_own() -> None:
-    screen = Screen(None)
-    screen.shown(WAITING)
-    screen.now = LOG_SECONDS
-    assert screen.shown(TRAINING).split("\n") == ["", f"  {describe(WAITING)}", f"  {describe(TRAINING)}", ""]
 
 
 def test_the_line_of_claims_says_what_runs_how_much_is_done_and_when_it_will_end() -> None:

@@ -58,17 +58,6 @@ def test_the_page_has_a_line_for_each_number_and_escapes_it() -> None:
     assert replication_cells.HOW.split(",")[0] in text
 
 
-def test_markdown_has_the_same_table() -> None:
-    lines = replication_cells.markdown(PAGE.numbers).splitlines()
-    assert "| number | protocol | published | ours | replicates | 95% of repetitions |" in lines
-    assert sum("&lt;neat&gt; on maze: reward" in line for line in lines) == 3
-
-
-def test_without_numbers_nothing_is_said_of_them() -> None:
-    bare = Page(title="A Paper", name="paper", boards=())
-    assert "replicate?" not in whole(bare)
-
-
 def test_a_claim_that_the_papers_own_numbers_would_not_pass_says_so(filled: Laboratory) -> None:
     """Here the trials at hand stand for the paper's: `better` does not solve, but is better."""
     solves, wins = filled.judge(better_solves, id="T1"), filled.judge(better_wins, id="T2")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from typing import Any
 
@@ -90,14 +89,6 @@ def test_what_is_said_of_a_trial_without_a_result_is_true_of_it(lab: Laboratory,
     assert lab.section(lab.judge(better_wins)).warnings == (said,)
 
 
-def test_a_diverged_trial_of_an_event_is_no_dot(lab: Laboratory) -> None:
-    lab.put("better", [1.0] * 5)
-    lab.store.put(record(CONDITIONS["better", "small"], 5, 1.0, status="diverged"), {})
-    (strip,) = lab.section(lab.judge(better_solves)).parts[0].strips
-    assert [dot.seed for dot in strip.dots] == [0, 1, 2, 3, 4]
-    assert (strip.apart, strip.n) == (((5, "diverged"),), 6)
-
-
 def test_a_nan_is_an_error_that_shows_which_trial_holds_it(lab: Laboratory) -> None:
     lab.put("better", [1.0, 1.0, float("nan"), 1.0, 1.0, 1.0])
     lab.put("worse", [0.1] * 6)
@@ -139,14 +130,6 @@ def test_a_method_edited_after_its_trials_is_said(filled: Laboratory) -> None:
     )
 
 
-def test_a_provenance_that_says_little_breaks_nothing(lab: Laboratory) -> None:
-    lab.put("better", [1.0] * 6, provenance={"device": None, "git": {}, "versions": None, "x64": False, "deep": {}})
-    section = lab.section(lab.judge(better_solves))
-    (origin,) = section.made
-    assert origin.device == "unknown device"
-    assert origin.settings == (("x64", "False"),)
-
-
 def test_a_claim_without_trials_says_why(lab: Laboratory) -> None:
     lab.put("better", [1.0] * 2)
     page = lab.page(lab.judge(better_solves))
@@ -155,18 +138,6 @@ def test_a_claim_without_trials_says_why(lab: Laboratory) -> None:
     assert section.report.reason == "better on small: 4 of 6 trials are missing"
     assert (section.parts, section.conditions, section.made.total()) == ((), (), 0)
     assert page.notices[0].startswith("No claim has been judged: neither the store nor the committed reference trials")
-
-
-def test_no_claims_at_all_is_said(lab: Laboratory) -> None:
-    assert lab.page().notices == ("There are no claims to report on.",)
-
-
-def test_a_store_of_another_schema_version_is_said(filled: Laboratory) -> None:
-    path = next(filled.store.record_paths())
-    path.write_text(json.dumps({**json.loads(path.read_text()), "schema": 2}))
-    page = filled.page(filled.judge(better_wins))
-    assert page.sections[0].report.outcome is Outcome.ERROR
-    assert "its schema is 2 and this version of evoclaims reads schema 1" in page.notices[0]
 
 
 def test_a_record_that_breaks_after_judging_is_said_and_left_out(filled: Laboratory) -> None:

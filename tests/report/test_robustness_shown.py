@@ -37,11 +37,6 @@ def test_a_verdict_stands_out_from_no_protocol_that_has_not_run() -> None:
     assert "<b>refuted</b>" not in whole(alone)
 
 
-def test_without_variants_nothing_is_said_of_them() -> None:
-    bare = Page(title="A Paper", name="paper", boards=())
-    assert "hang on a detail" not in whole(bare)
-
-
 def test_the_heading_of_a_variant_is_shown_whole() -> None:
     board = Board("smoke", (Section(report("G1"), "G1", (), ("§1",)),))
     row = Robustness("G1", "smoke", Outcome.SUPPORTED, {"large_<network>": Outcome.SUPPORTED})

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from html import escape
 
-import pytest
 from hand_made_verdicts import report
 from hypothesis import example, given
 from hypothesis import strategies as st
@@ -24,43 +23,27 @@ def _rows(text: str) -> list[list[str]]:
     return [[cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]] for line in lines[2:]]
 
 
-def test_a_row_shows_claim_sentence_verdict_n_p_and_why() -> None:
-    (row,) = _rows(run_summary([report("G1", "refuted", case="n_parity")]))
-    assert row == [
-        r"G1\[n\_parity\] (smoke)",
-        "All levels are solved (§5.1)",
-        "✗ refuted",
-        "10",
-        "against 0.0043",
-        "for a reason",
+def test_a_row_shows_claim_sentence_verdict_n_p_and_why_between_totals_and_notes() -> None:
+    plain, accepted = report("G1", "refuted", case="n_parity"), report("G2", expected="supported", because="known")
+    text = run_summary([plain, accepted], ["1 changed", "a*b"])
+    assert _rows(text) == [
+        [
+            *(r"G1\[n\_parity\] (smoke)", "All levels are solved (§5.1)", "✗ refuted", "10", "against 0.0043"),
+            "for a reason",
+        ],
+        [
+            *("G2 (smoke)", "All levels are solved (§5.1)", r"✓ supported\*", "10", "0.028"),
+            "for a reason; examined and accepted: known",
+        ],
     ]
-
-
-def test_totals_and_notes_stand_above_and_below() -> None:
-    lines = run_summary([report("G1", "refuted"), report("G2", "supported")], ["1 changed", "a*b"]).splitlines()
+    lines = text.splitlines()
     assert lines[:3] == ["## Claims", "", "**1 supported, 1 refuted**"]
     assert lines[-2:] == ["* 1 changed", r"* a\*b"]
 
 
-def test_an_accepted_verdict_says_why_it_is_accepted() -> None:
-    (row,) = _rows(run_summary([report("G1", "refuted", expected="refuted", because="known")]))
-    assert row[2] == r"✗ refuted\*"
-    assert row[5] == "for a reason; examined and accepted: known"
-
-
-def test_rows_come_in_the_order_in_which_people_count() -> None:
-    rows = _rows(run_summary([report(name) for name in ("G10", "C1", "G9")]))
-    assert [row[0].split()[0] for row in rows] == ["C1", "G9", "G10"]
-
-
-def test_what_was_not_measured_is_a_dash() -> None:
-    (row,) = _rows(run_summary([report(outcome="error", verdict=None)]))
-    assert row[3:5] == ["–", "–"]
-
-
-@pytest.mark.parametrize("field", ["case", "statement", "where", "reason", "because", "tier"])
-def test_a_hostile_sentence_stays_in_its_cell(field: str) -> None:
-    text = run_summary([report("G1", "refuted", expected="refuted", **{field: HOSTILE}), report("G2")], [HOSTILE])
+def test_hostile_sentences_stay_in_their_cells() -> None:
+    fields = dict.fromkeys(("case", "statement", "where", "reason", "because", "tier"), HOSTILE)
+    text = run_summary([report("G1", "refuted", expected="refuted", **fields), report("G2")], [HOSTILE])
     assert len(_rows(text)) == 2
     assert {len(row) for row in _rows(text)} == {6}
     assert "<" not in text

@@ -16,7 +16,6 @@ from rich.cells import cell_len
 from evoclaims.judging.drift_report import DriftReport, DriftRow
 from evoclaims.judging.verdict import Outcome
 from evoclaims.report.console import PlainSpokenConsole, plain_table
-from evoclaims.report.table_cells import totals
 from evoclaims.report.terminal_table import drift_lines, explanations, verdict_table
 
 
@@ -24,8 +23,7 @@ def test_a_row_shows_claim_sentence_verdict_n_effect_p_and_evidence() -> None:
     parts = (evidence(0.5), evidence(0.9375))
     judged = report(case="n_parity", evidence="a/verdicts/smoke/G1.json", verdict=verdict(evidence=parts, deciding=1))
     table = verdict_table([judged], 160, False)
-    heading, row, *_, caption = table.splitlines()
-    assert " ".join(heading.split()) == "claim what is claimed verdict n A12 p (attainable) evidence"
+    _, row, *_, caption = table.splitlines()
     cells = re.split(r" {2,}", row.strip())
     assert cells == [
         "G1[n_parity]",
@@ -46,11 +44,8 @@ def test_a_refuted_claim_shows_the_p_against_it_and_the_effect_of_the_part_that_
     assert re.split(r" {2,}", row.strip())[2:] == ["✗ refuted", "10", "0.06", "against 0.0043 (0.0042)"]
     without = replace(refuted, verdict=verdict("refuted", evidence=parts, deciding=2))
     assert re.split(r" {2,}", verdict_table([without], 160, False).splitlines()[1].strip())[4] == "–"
-
-
-def test_what_was_not_measured_is_shown_as_a_dash() -> None:
-    row = verdict_table([report(outcome="error", verdict=None)], 160, False).splitlines()[1]
-    assert re.split(r" {2,}", row.strip())[2:] == ["E error", "–", "–", "–"]
+    unmeasured = verdict_table([report(outcome="error", verdict=None)], 160, False).splitlines()[1]
+    assert re.split(r" {2,}", unmeasured.strip())[2:] == ["E error", "–", "–", "–"]
 
 
 def test_rows_come_in_the_order_in_which_people_count() -> None:
@@ -85,15 +80,12 @@ def test_any_text_can_be_shown(text: str) -> None:
         explanations([odd], 100, colour)
 
 
-def test_a_sentence_over_several_lines_stays_in_its_row() -> None:
-    table = verdict_table([report(statement="All levels\n    are\tsolved")], 160, False)
-    assert "All levels are solved (§5.1)" in table
-
-
 def test_colour_is_used_only_where_it_is_wanted() -> None:
-    refuted = report(outcome="refuted")
+    refuted = report(outcome="refuted", expected="refuted")
     assert "\x1b[31m" in verdict_table([refuted], 120, True)
-    assert "\x1b" not in verdict_table([refuted], 120, False)
+    plain = verdict_table([refuted], 120, False)
+    assert "\x1b" not in plain
+    assert "✗ refuted*" in plain
 
 
 def test_only_what_is_not_plainly_supported_is_explained() -> None:
@@ -109,17 +101,6 @@ def test_only_what_is_not_plainly_supported_is_explained() -> None:
     )
     not_run = replace(surprising, outcome=Outcome.NOT_RUN)  # which says nothing against what was accepted
     assert explanations([not_run], 100, False) == "- G1: for a reason"
-
-
-def test_an_accepted_verdict_is_marked_in_its_row() -> None:
-    assert "✗ refuted*" in verdict_table([report(outcome="refuted", expected="refuted")], 120, False)
-    assert "refuted*" not in verdict_table([report(outcome="refuted", expected="error")], 120, False)
-
-
-def test_totals_count_each_outcome_in_one_line() -> None:
-    reports = [report(outcome=outcome) for outcome in ("refuted", "supported", "not run", "supported", "error")]
-    assert totals(reports) == "2 supported, 1 refuted, 1 error, 1 not run"
-    assert totals([]) == "no verdicts"
 
 
 def test_the_comparison_with_the_references_says_what_drifted_and_what_it_did_not_see() -> None:
@@ -166,33 +147,12 @@ def test_without_drift_the_nearest_comparison_and_what_was_detectable_are_shown(
     )
 
 
-def test_what_trials_overspent_is_shown_also_where_a_claim_is_supported() -> None:
-    for field in ("overspent", "copies"):
-        shown = replace(report(), verdict=verdict(Outcome.SUPPORTED, **{field: "3 of 10 trials of a"}))
-        assert explanations([shown], 200, colour=False).startswith("✓ ")
-    over = replace(report(), verdict=verdict(Outcome.SUPPORTED, overspent="3 of 10 trials of a spent up to 9 of 5"))
-    assert "[over budget: 3 of 10 trials of a spent up to 9 of 5]" in explanations([over], 200, colour=False)
-
-
-def test_eighty_columns_leave_out_the_files_and_nothing_else() -> None:
-    shown = [report(case="n_parity", evidence="a/verdicts/smoke/G1.json"), report("G2", "refuted", expected="refuted")]
-    lines = verdict_table(shown, 80, False).splitlines()
-    assert " ".join(lines[0].split()) == "claim what is claimed verdict n A12 p (attainable)"
-    assert all(len(line) <= 80 for line in lines)
-    assert "evidence: a/verdicts/smoke/<claim>.json" in lines
-    assert re.search(r"✗ refuted\* +10 +– +against 0.0043", "\n".join(lines))
-
-
 LONG = "NEAT climbs every level of every task that was ever posed, 和 never falls back"
 
 
-@pytest.mark.parametrize("width", [20, 60, 80, 100, 120, 200])
+@pytest.mark.parametrize("width", [20, 60, 80, 120])
 def test_a_claim_is_one_line_at_any_width_and_its_id_is_whole(width: int) -> None:
-    cases = [
-        "",
-        "cma_es-hyperneat-simple_alu",
-        "in_a_case_of_so_many_parameters_that_no_terminal_is_wide_enough_for_it" * 2,
-    ]
+    cases = ["", "cma_es-hyperneat-simple_alu", "in_a_case_of_so_many_parameters_that_no_terminal_is_wide_enough" * 2]
     reports = [report("G1", case=case, statement=LONG, evidence="a/verdicts/G1.json") for case in cases]
     heading, *rows, caption = verdict_table(reports, width, False).splitlines()
     assert caption.startswith("evidence: ")
@@ -215,12 +175,16 @@ def test_columns_make_room_for_the_sentence_the_least_important_first() -> None:
     }
 
 
-def test_trials_without_a_result_are_told_of_whatever_the_verdict() -> None:
+def test_trials_without_a_result_or_over_budget_are_told_of_whatever_the_verdict() -> None:
+    for field in ("overspent", "copies"):
+        shown = replace(report(), verdict=verdict(Outcome.SUPPORTED, **{field: "3 of 10 trials of a"}))
+        assert explanations([shown], 200, colour=False).startswith("✓ ")
+    over = replace(report(), verdict=verdict(Outcome.SUPPORTED, overspent="3 of 10 trials of a spent up to 9 of 5"))
+    assert "[over budget: 3 of 10 trials of a spent up to 9 of 5]" in explanations([over], 200, colour=False)
     for outcome in ("supported", "refuted"):
         broken = verdict(outcome, without_result="2 of 10 trials of a ran out of time (seeds 0, 3)")
         told = explanations([report(outcome=outcome, verdict=broken)], 160, False)
         assert told.endswith("G1: for a reason [worst rank: 2 of 10 trials of a ran out of time (seeds 0, 3)]")
-    assert explanations([report()], 160, False) == ""
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1", "koi8-r", None])

@@ -50,12 +50,9 @@ def test_long_curves_keep_their_ends_and_at_most_a_hundred_points(read: Any) -> 
     assert len(read(_curve(range(7)))[0].curves["gain"]) == 7
 
 
-def test_each_trial_has_a_line(read: Any) -> None:
+def test_each_trial_has_a_line_with_gaps_where_values_are_no_numbers(read: Any) -> None:
     lines = _only(panels(read(*(_curve([0, i, i]) for i in range(MAX_TRIALS))))).lines
     assert [(line.label, line.y[-1]) for line in lines] == [(f"seed {i}", i) for i in range(MAX_TRIALS)]
-
-
-def test_values_that_are_no_numbers_leave_gaps_and_are_counted(read: Any) -> None:
     nan = float("nan")
     panel = _only(panels(read(_curve([0, nan, 2]), _curve([1, 1, float("inf")]), _curve([0, 1, 2]))))
     assert panel.broken == 2

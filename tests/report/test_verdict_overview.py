@@ -36,11 +36,6 @@ def test_controls_are_no_sentences_of_the_paper_and_have_a_table_of_their_own(la
     ]
 
 
-def test_a_paper_without_controls_has_one_table(lab: Laboratory) -> None:
-    text = overview({"full": [_report("G1", "§5.1")]}, {"G1": "It solves"}, Reader(lab.archive))
-    assert "control" not in text
-
-
 class _OnMachines:
     """Reads trials whose ids are the devices that they were made on."""
 

@@ -101,7 +101,6 @@ def main(options: argparse.Namespace) -> int:
 
 
 def _differs(first: Judged, now: Judged, kind: str) -> bool:
-    """Whether a claim, or one of its cases, has changed against the first release."""
     return any(KINDS[kind](cell) for (_, label), cell in across([first, now]).cells.items() if label == now.label)
 
 

@@ -66,7 +66,6 @@ def _sides(project: Project, tiers: Sequence[str], places: Sequence[str]) -> tup
 
 
 def _store(name: str) -> Store:
-    """Return the store that the command line names."""
     if not os.path.isdir(name):
         raise UserError(f"There is no trial store {name!r}: no folder has this name. Check it.")
     return open_store(name)

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -82,7 +82,8 @@ class Elsewhere:
             if notes:
                 print(f"{label}: {notes}", flush=True)
             if below := environment.below(recipe.package, self.root):
-                raise NotJudgedError(_too_old(below))
+                old = ", ".join(f"{name} {now} (oldest supported: {oldest})" for name, (now, oldest) in below.items())
+                raise NotJudgedError(f"it has {old}; name a release that works with supported ones")
             log = os.path.relpath(environment.folder / LOG)
             print(f"{label}: judging claims; what pytest says is in {log}", flush=True)
             reports = self._run(environment, store)
@@ -136,12 +137,6 @@ def _of_other_versions(reports: Sequence[ClaimReport], environment: Environment)
     here = {name: environment.versions.get(canonicalize_name(name)) for name in made_with}
     others = {name: those for name, those in made_with.items() if here[name] is not None and those != (here[name],)}
     return ", ".join(f"{name} {in_words(those)}" for name, those in others.items())
-
-
-def _too_old(below: Mapping[str, tuple[str, str]]) -> str:
-    """Return why claims are not judged in an environment with these packages."""
-    found = ", ".join(f"{name} {version} (oldest supported: {oldest})" for name, (version, oldest) in below.items())
-    return f"it has {found}; name a release that works with supported ones"
 
 
 def _last_words(status: int, output: str) -> str:

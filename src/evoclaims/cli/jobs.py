@@ -5,9 +5,8 @@ from __future__ import annotations
 import argparse
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 from evoclaims.cli.project import Project, open_project
 from evoclaims.cluster.submissions import (
@@ -30,23 +29,13 @@ TAIL: Final = 20_000
 """Bytes at the end of a log in which a reason is looked for."""
 
 
-@dataclass(frozen=True)
-class Place:
+class Place(NamedTuple):
     """Where a batch was submitted last: the submission with its name, and of it the job and the batch."""
 
     name: str
     submission: Submission
     job: SubmittedJob
     batch: SubmittedBatch
-
-
-@dataclass(frozen=True)
-class JobRow(Place):
-    """What has become of a batch: "queued", "running", "done" or "failed", why, if that is known, and its output."""
-
-    state: str
-    reason: str
-    log: Path
 
 
 def main(options: argparse.Namespace) -> int:
@@ -56,12 +45,10 @@ def main(options: argparse.Namespace) -> int:
     if not rows:
         print(f"No job was submitted for {project.store.root}: `evoclaims submit` does.")
         return 0
-    for row in rows:
-        job, batch = row.job, row.batch
-        because = f": {row.reason}" * bool(row.reason)
-        log = f" ({row.log})" * row.log.exists()
-        print(f"{row.state:8} {job.id}  {batch.label}, {row.submission.tier_and_variant}{because}{log}")
-    counts = {state: sum(row.state == state for row in rows) for state in ("queued", "running", "done", "failed")}
+    for place, state, reason, log in rows:
+        more = f": {reason}" * bool(reason) + f" ({log})" * log.exists()
+        print(f"{state:8} {place.job.id}  {place.batch.label}, {place.submission.tier_and_variant}{more}")
+    counts = {name: sum(state == name for _, state, *_ in rows) for name in ("queued", "running", "done", "failed")}
     print(", ".join(f"{count} {state}" for state, count in counts.items() if count))
     if counts["failed"]:
         print("`evoclaims submit` submits what has failed again; it goes on from its checkpoints.")
@@ -71,14 +58,14 @@ def main(options: argparse.Namespace) -> int:
 def active(project: Project) -> dict[str, str]:
     """Return the conditions whose batch is queued or running, with a sentence that says so."""
     return {
-        row.batch.condition: f"{row.state} already, as job {row.job.id}"
-        for row in _rows(project)
-        if row.state in ("queued", "running")
+        place.batch.condition: f"{state} already, as job {place.job.id}"
+        for place, state, *_ in _rows(project)
+        if state in ("queued", "running")
     }
 
 
-def _rows(project: Project) -> Iterator[JobRow]:
-    """Yield what has become of each batch that was submitted."""
+def _rows(project: Project) -> Iterator[tuple[Place, str, str, Path]]:
+    """Yield of each batch its place, its state, such as "queued" or "failed", why, if that is known, and its output."""
     latest: dict[str, Place] = {}
     for name, submission in load_all(project.store.root).items():
         for job in submission.jobs:
@@ -92,10 +79,9 @@ def _rows(project: Project) -> Iterator[JobRow]:
     for condition, place in latest.items():
         log, found = log_of(project.store.root, place.name, place.job), seen.get((place.name, place.job.id), GONE)
         if condition not in owed or (found.state is State.ENDED and not _lacks(project, place)):  # it ended meanwhile
-            yield JobRow(**vars(place), state="done", reason="", log=log)
+            yield place, "done", "", log
         else:
-            state, reason = _state_and_reason(project, place, found, log)
-            yield JobRow(**vars(place), state=state, reason=reason, log=log)
+            yield place, *_state_and_reason(project, place, found, log), log
 
 
 def _lacks(project: Project, place: Place) -> bool:
@@ -111,7 +97,6 @@ def _lacks(project: Project, place: Place) -> bool:
 
 
 def _state_and_reason(project: Project, place: Place, seen: Seen, log: Path) -> tuple[str, str]:
-    """Return the state of a batch with missing trials, and its reason."""
     if seen.state is State.ENDED:
         words = "; ".join(filter(None, [seen.reason, last_words(log)]))
         gone = "it is no longer queued and has printed nothing" if seen == GONE else "it ended without a word"

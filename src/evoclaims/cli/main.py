@@ -82,7 +82,6 @@ def _raised_in_project(error: Exception) -> str:
 
 
 def _done(options: argparse.Namespace) -> int:
-    """Run one command to its end; return its exit status."""
     _check_folder()
     from evoclaims.cli.store_folder import storage_of
 

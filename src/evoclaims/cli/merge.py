@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from evoclaims.cli.store_folder import open_store
 from evoclaims.core.canonical import canonical_json
@@ -84,7 +84,10 @@ def _difference(one: TrialResult, other: TrialResult) -> str:
     parts = [f"{one.status} and {other.status}"] if one.status != other.status else []
     for name in ("metrics", "levels", "curves"):
         here, there = getattr(one, name), getattr(other, name)
-        keys = [key for key in sorted({*here, *there}) if not _same(here.get(key), there.get(key))]
+        # As JSON, in which NaN equals NaN.
+        keys = [
+            key for key in sorted({*here, *there}) if canonical_json(here.get(key)) != canonical_json(there.get(key))
+        ]
         scalars = (
             [f"{key} {here.get(key, '–')} and {there.get(key, '–')}" for key in keys] if name == "metrics" else keys
         )
@@ -95,11 +98,6 @@ def _difference(one: TrialResult, other: TrialResult) -> str:
     where = devices if devices[0] != devices[1] else machines
     made = f"; made on {where[0]} and {where[1]}" if where[0] != where[1] else "; made on machines of one kind"
     return f"{', '.join(parts) or 'digests'} differ{made}"
-
-
-def _same(one: Any, other: Any) -> bool:
-    """Whether two values of records are equal; NaN equals NaN."""
-    return canonical_json(one) == canonical_json(other)
 
 
 def main(options: argparse.Namespace) -> int:

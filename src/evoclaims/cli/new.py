@@ -39,7 +39,11 @@ NEXT: Final = "next.txt"
 
 def main(options: argparse.Namespace) -> int:
     """Write the project and say what to do next."""
-    layers = _starter(options.kind) if options.paper is None else _paper(options.paper)
+    if options.paper is None:
+        require_known("kind of starter project", options.kind, KINDS)
+        layers = [STARTERS / layer for layer in KINDS[options.kind]]
+    else:
+        layers = _paper(options.paper)
     folder = Path(options.folder)
     _check(folder)
     count = _write(layers, folder)
@@ -52,13 +56,7 @@ def main(options: argparse.Namespace) -> int:
     return 0
 
 
-def _starter(kind: str) -> list[Path]:
-    require_known("kind of starter project", kind, KINDS)
-    return [STARTERS / layer for layer in KINDS[kind]]
-
-
 def _paper(name: str) -> list[Path]:
-    """Return the layers of a paper's project."""
     require_known("paper", name, [path.name for path in PROJECTS.iterdir() if path.is_dir() and path != STARTERS])
     project = PROJECTS / name
     return [project] if (project / "claims").exists() else [CHECKOUT, project]

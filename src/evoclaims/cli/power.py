@@ -179,7 +179,6 @@ def _versions(pilots: Pilots, wanted: Mapping[Names, Condition]) -> list[str]:
 
 
 def _advice(options: argparse.Namespace) -> str:
-    """Return the sentence that says how pilots are made."""
     chosen = f" --tier {options.tier}" * (options.tier != "smoke")
     chosen += f" --pilot {options.pilot}" * bool(options.pilot)
     chosen += "" if options.only is None else f" --only {shlex.quote(options.only)}"

@@ -59,7 +59,8 @@ def _commands(whole: argparse.ArgumentParser) -> list[tuple[str, str, argparse.A
 
 
 def _section(name: str, command: argparse.ArgumentParser) -> str:
-    says = literal(_sentence(str(command.description)))
+    says = str(command.description)
+    says = literal(f"{says[:1].upper()}{says[1:]}.")
     return f"## {name}\n\n{says}\n\n{table(('argument', 'meaning'), _rows(command))}"
 
 
@@ -77,16 +78,9 @@ def _written(action: argparse.Action) -> str:
         return f"[{values}]" if action.nargs in ("?", "*") and "[" not in values else values
     if action.nargs == 0:
         return action.option_strings[0]
-    if action.nargs == "?":
-        values = f"[{values}]"
-    elif action.nargs == "+" and not isinstance(value, tuple):
+    if action.nargs == "+" and not isinstance(value, tuple):
         values = f"{values} …"
     return f"{action.option_strings[0]} {values}"
-
-
-def _sentence(text: str) -> str:
-    """Return a text that begins with a capital letter and ends with a full stop."""
-    return f"{text[:1].upper()}{text[1:]}".removesuffix(".") + "."
 
 
 _TABLE: Final = re.compile(
@@ -156,15 +150,6 @@ def _made(found: re.Match[str], project: Project) -> str:
     return _KINDS[kind](project, words, found["before"])
 
 
-def _verdicts(project: Project, words: list[str], *_: str) -> str:
-    return overview(*_columns(project, words), Reader(project.archive))
-
-
-def _marks(project: Project, words: list[str], before: str) -> str:
-    """Return the verdicts as marks: of the sentences chosen and shortened in the table `before`, or of all."""
-    return marks(*_columns(project, words), short_sentences(before))
-
-
 def _columns(project: Project, words: list[str]) -> tuple[dict[str, list[ClaimReport]], dict[str, str]]:
     """Return reports by heading, and the paper's own sentences.
 
@@ -183,21 +168,9 @@ def _columns(project: Project, words: list[str]) -> tuple[dict[str, list[ClaimRe
     return {heading: judged[column] for heading, column in asked.items()}, says
 
 
-def _tally(project: Project, words: list[str], *_: str) -> str:
-    """Return how many verdicts of a tier ended how."""
-    (reports,) = project.judge_variants([(_tier(project, words), "")])
-    return tally(reports)
-
-
-def _sentences(project: Project, words: list[str], *_: str) -> str:
-    """Return how many of the paper's sentences ended how."""
-    (reports,) = project.judge_variants([(_tier(project, words), "")])
-    return by_sentence(sentences([report for report in reports if not report.is_control]))
-
-
-def _readings(project: Project, words: list[str], *_: str) -> str:
-    (reports,) = project.judge_variants([(_tier(project, words), "")])
-    return verdict_overview.readings(reports)
+def _of_a_tier(shown: Callable[[list[ClaimReport]], str]) -> Callable[[Project, list[str], str], str]:
+    """Return what makes a table of one tier's verdicts."""
+    return lambda project, words, _: shown(project.judge(_tier(project, words)))
 
 
 def _details(project: Project, words: list[str], *_: str) -> str:
@@ -226,7 +199,6 @@ def _refutations(project: Project, words: list[str], *_: str) -> str:
 
 
 def _under_variants(project: Project, tier: str) -> tuple[tuple[Robustness, ...], list[str]]:
-    """Return a tier's verdicts under all variants, and the names of the variants."""
     variants = list(project.reproduction.variants)
     plain, *varied = project.judge_variants([(tier, name) for name in ("", *variants)])
     return matrix(plain, dict(zip(variants, varied, strict=True))), variants
@@ -273,14 +245,15 @@ def _numbers(project: Project, words: list[str], *_: str) -> str:
 
 
 _KINDS: Final[Mapping[str, Callable[[Project, list[str], str], str]]] = {
-    "verdicts": _verdicts,
-    "marks": _marks,
-    "sentences": _sentences,
-    "tally": _tally,
+    "verdicts": lambda project, words, _: overview(*_columns(project, words), Reader(project.archive)),
+    # Of the sentences that the table before has chosen and shortened, or of all.
+    "marks": lambda project, words, before: marks(*_columns(project, words), short_sentences(before)),
+    "sentences": _of_a_tier(lambda reports: by_sentence(sentences([one for one in reports if not one.is_control]))),
+    "tally": _of_a_tier(tally),
     "details": _details,
     "refutations": _refutations,
     "numbers": _numbers,
-    "readings": _readings,
+    "readings": _of_a_tier(verdict_overview.readings),
     "uncovered": lambda project, *_: verdict_overview.without_claims(uncovered(project.reproduction.folder)),
     "measures": lambda project, *_: vocabulary.measures(project.reproduction.trials),
     "assertions": lambda *_: vocabulary.assertions(),

@@ -69,7 +69,8 @@ def main(options: argparse.Namespace) -> int:
     gone = sorted(had - {*left_out, *(one.label for one in watch.conditions)})
     sentences = _sentences(watch, series, left_out, gone, shown, path)
     console = PlainSpokenConsole(file=styled())
-    console.print_whole(plain_table(_headings(), _rows(watch, series[-1])))
+    headings = ("family", "evidence", *(f"finds {shift:g} SD in" for shift in FOUND))
+    console.print_whole(plain_table(headings, _rows(watch, series[-1])))
     print(*sentences, sep="\n")
     if options.form is not None:
         out = Path(options.out or REPORT / "watch.md")
@@ -175,10 +176,6 @@ def _night(watch: Watch, trials: Mapping[str, Sequence[TrialResult]], going_on: 
     )
     evidence = {family.label: family.path((*going_on, night))[-1] for family in watch.families}
     return structs.replace(night, evidence=evidence)
-
-
-def _headings() -> tuple[str, ...]:
-    return ("family", "evidence", *(f"finds {shift:g} SD in" for shift in FOUND))
 
 
 def _rows(watch: Watch, night: Night) -> list[tuple[str, ...]]:

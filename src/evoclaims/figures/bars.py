@@ -146,7 +146,6 @@ def _families(names: Iterable[str]) -> list[list[int]]:
 
 
 def _told(measured: Measured) -> list[str]:
-    """Return a panel's published numbers in words."""
     return [
         f"{bar.bar.series.label} {bar.reported.value:g}" + (f" ± {bar.reported.error:g}" if bar.reported.error else "")
         for bar in measured.bars
@@ -155,7 +154,6 @@ def _told(measured: Measured) -> list[str]:
 
 
 def _rows(measured: Measured) -> list[dict[str, Any]]:
-    """Return a panel's rows of the table."""
     rows: list[dict[str, Any]] = []
     for bar in measured.bars:
         rows += bar.numbers.rows(**_place(measured, bar.bar))

@@ -56,23 +56,16 @@ def compare(samples: Sequence[Sequence[float]], families: Sequence[Sequence[int]
         present = tuple(i for i in family if samples[i])
         if len(present) < 2:
             continue
-        overall = _kruskal_wallis([samples[i] for i in present])
+        groups = [samples[i] for i in present]
+        constant = len({value for group in groups for value in group}) == 1  # scipy has no p for constant data
+        overall = 1.0 if constant else float(kruskal(*groups).pvalue)  # asymptotic, as in the paper
         for left, right in combinations(present, 2):
-            p = _mann_whitney(samples[left], samples[right])
+            a, b = samples[left], samples[right]
+            # By scipy's default method, as in the paper.
+            p = 1.0 if len({*a, *b}) == 1 else float(mannwhitneyu(a, b, alternative="two-sided").pvalue)
             stars = next((stars for threshold, stars in ASTERISKS if p < threshold and overall < LEVEL), "")
             found.append(PairTest(left, right, present, p, overall, stars))
     return tuple(found)
-
-
-def _kruskal_wallis(groups: Sequence[Sequence[float]]) -> float:
-    """Return the p of the Kruskal-Wallis test that all groups share a distribution (asymptotic, as in the paper)."""
-    constant = len({value for group in groups for value in group}) == 1  # scipy has no p for constant data
-    return 1.0 if constant else float(kruskal(*groups).pvalue)
-
-
-def _mann_whitney(a: Sequence[float], b: Sequence[float]) -> float:
-    """Return the p of the two-sided Mann-Whitney U test (scipy's default method, as in the paper)."""
-    return 1.0 if len({*a, *b}) == 1 else float(mannwhitneyu(a, b, alternative="two-sided").pvalue)
 
 
 def stack(spans: Sequence[tuple[float, float]], tops: Sequence[tuple[float, float]], row: float) -> list[float]:

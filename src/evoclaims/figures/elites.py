@@ -102,7 +102,6 @@ def _first_map(scope: Scope, ground: Ground) -> Map | None:
 
 
 def _unmapped(scope: Scope, ground: Ground) -> str:
-    """Say that no map is stored, and what to do."""
     return (
         f"No map of {ground.method} on {ground.task} is stored (maps lie with champions, which reference trials leave "
         f"out): `evoclaims run {ground.method} --on {ground.task} --tier {scope.tier_name} --trials 1` makes one."

@@ -91,7 +91,6 @@ class Listing:
         return Drawing(figure, table, caption, (), len(rows), f"{heading.title} ({heading.place})")
 
     def _settings(self, scope: Scope, block: Block, tiers: Sequence[str]) -> list[Setting]:
-        """Read a block's settings at every tier."""
         values = self.published.table(block.published)["values"]
         if not set(values) <= set(block.settings):
             raise UserError(
@@ -152,7 +151,6 @@ class _Page:
 
 
 def _text(value: Any) -> str:
-    """Return a setting in words."""
     if isinstance(value, int):
         return f"{value:,}"
     return f"{value:g}" if isinstance(value, float) else str(value)

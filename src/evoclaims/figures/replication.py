@@ -122,7 +122,6 @@ def counts_by_condition(found: Sequence[Replication]) -> Mapping[str, Mapping[Ag
 
 
 def _together(levels: Sequence[Replication]) -> Agreement:
-    """Return the answer of a condition."""
     joint = {(one.jointly or one.repetition).agreement for one in levels}
     if Agreement.CONTRADICTED in joint:
         return Agreement.CONTRADICTED
@@ -174,7 +173,6 @@ def _ours(scope: Scope, quantity: str, method: str, task: str, at: int) -> tuple
 
 
 def _judged(reported: Reported, numbers: TrialNumbers, planned: int, among: int) -> Repetition:
-    """Put our numbers to the published number."""
     if reported.trials is None:
         return Repetition((), Answer.UNKNOWN, "reported.toml does not say of how many trials the number is the mean")
     mean = PublishedMean(reported.value, reported.error, reported.trials, reported.scale, reported.precision)

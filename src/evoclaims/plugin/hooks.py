@@ -136,22 +136,12 @@ def _is_left_out(collector: pytest.Module | pytest.Class, name: str, one: type) 
 def pytest_load_initial_conftests(early_config: pytest.Config) -> None:
     """Keep this process off GPUs that are for others, before anything can make an array; options are parsed."""
     known = early_config.known_args_namespace
-    if known.claims_processes != "1" and gpus(known.claims_device) and _has_claims(early_config):
+    # Other projects that have evoclaims installed are left alone.
+    if known.claims_processes != "1" and gpus(known.claims_device) and options.settings_of(early_config):
         from evoclaims.execution.host import host_of
 
         with suppress(UserError):  # `options.check` reports it
             host_of(known.claims_processes, known.claims_device)
-
-
-def _has_claims(config: pytest.Config) -> bool:
-    """Whether the project is one with claims: other projects that have evoclaims installed are left alone."""
-    from evoclaims.paper.config import load_config
-
-    try:
-        load_config(config.rootpath)
-    except UserError:
-        return False
-    return True
 
 
 _ended: pytest.StashKey[pytest.Session] = pytest.StashKey()
@@ -238,15 +228,13 @@ def pytest_collection_modifyitems(session: pytest.Session, config: pytest.Config
 
 def _collects_all(session: pytest.Session) -> bool:
     """Whether a run has collected all files in the project's folder of claims."""
-    from evoclaims.paper.config import load_config
-
     config = session.config
     if session.testsfailed or any(config.getoption(name, None) for name in ("ignore", "ignore_glob", "lf")):
         return False
-    try:
-        claims = (config.rootpath / load_config(config.rootpath).claims).resolve()
-    except UserError:
+    settings = options.settings_of(config)
+    if settings is None:
         return False
+    claims = (config.rootpath / settings.claims).resolve()
     return any(claims.is_relative_to((config.invocation_params.dir / place).resolve()) for place in config.args)
 
 

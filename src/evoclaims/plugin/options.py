@@ -5,7 +5,6 @@ Nothing heavy is imported here at the top: pytest loads this file in every run o
 
 from __future__ import annotations
 
-import contextlib
 import os
 import re
 from collections.abc import Iterable
@@ -23,6 +22,7 @@ if TYPE_CHECKING:
     from evoclaims.claims.claim import ClaimTest
     from evoclaims.claims.session import Session
     from evoclaims.execution.ahead import Ahead
+    from evoclaims.paper.config import SuiteConfig
     from evoclaims.paper.reproduction import Reproduction
     from evoclaims.trials.store import Store
 
@@ -234,11 +234,20 @@ def _ahead(config: pytest.Config, reproduction: Reproduction, store: Store, limi
 
 def import_from_root(config: pytest.Config) -> None:
     """Let claim files import the project's modules, as they can where a command collects them."""
-    if names_us(config):  # other projects import nothing for it
-        from evoclaims.paper.config import load_config, make_importable
+    if names_us(config) and (settings := settings_of(config)):  # other projects import nothing for it
+        from evoclaims.paper.config import make_importable
 
-        with contextlib.suppress(UserError):  # an unreadable file is reported later
-            make_importable(load_config(config.rootpath).root)
+        make_importable(settings.root)
+
+
+def settings_of(config: pytest.Config) -> SuiteConfig | None:
+    """Return the settings of the project; None for one without claims, or where they cannot be read: told later."""
+    from evoclaims.paper.config import load_config
+
+    try:
+        return load_config(config.rootpath)
+    except UserError:
+        return None
 
 
 def names_us(config: pytest.Config) -> bool:

@@ -80,7 +80,6 @@ class ProgressLine:
                 self._line.close()
 
     def _made(self) -> LiveLine:
-        """Return the line, made when it is first needed."""
         if self._line is None:
             from evoclaims.report.live_line import LiveLine
 
@@ -120,18 +119,14 @@ class ProgressLine:
         with self._aside():
             return (yield)
 
+    pytest_runtest_logfinish = pytest_runtest_logstart
+
     @pytest.hookimpl(wrapper=True, tryfirst=True)
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> Generator[None, Any, Any]:
         """Make room for what pytest writes, and count a claim that has been judged."""
         with self._aside():
             if self._watching is not None and (report.when == "call" or not report.passed):
                 self._watching.judged(report.nodeid)
-            return (yield)
-
-    @pytest.hookimpl(wrapper=True, tryfirst=True)
-    def pytest_runtest_logfinish(self) -> Generator[None, Any, Any]:
-        """Make room for what pytest writes."""
-        with self._aside():
             return (yield)
 
     @pytest.hookimpl(tryfirst=True)

@@ -157,7 +157,6 @@ class Summary:
 
     @property
     def _judged(self) -> bool:
-        """Whether any claim has a verdict, even an undecided or broken one."""
         return any(report.outcome != "not run" for report in self.reports)
 
     def pytest_terminal_summary(self, terminalreporter: Any, exitstatus: int) -> None:
@@ -204,7 +203,6 @@ class Summary:
                 terminalreporter.write_line(self._safe(line))
 
     def _closing_lines(self) -> list[str]:
-        """Return what failed, what changed, and what to do next."""
         from evoclaims.report.run_summary import closing_lines
 
         changed, regressed = None, []
@@ -233,16 +231,12 @@ class Summary:
 
         known: set[str] = self._config.stash[KNOWN]
         names = sorted(known, key=lambda name: in_order(("", name)))
+        given = {"-m": self._config.getoption("markexpr", ""), "-k": self._config.getoption("keyword", "")}
+        asked = " with ".join(f"{option} {shlex.quote(value)}" for option, value in given.items() if value)
         return (
-            f"No claim was selected{self._asked()}: --claims-only={names[0]} selects claims by their ids, "
+            f"No claim was selected{asked and f' by {asked}'}: --claims-only={names[0]} selects claims by their ids, "
             f"{' and '.join(f'-m {tier}' for tier in TIERS)} their tier. Claims here: {', '.join(names)}."
         )
-
-    def _asked(self) -> str:
-        """Say which options together have selected no claim; nothing where none of them was given."""
-        given = {"-m": self._config.getoption("markexpr", ""), "-k": self._config.getoption("keyword", "")}
-        options = [f"{option} {shlex.quote(value)}" for option, value in given.items() if value]
-        return f" by {' with '.join(options)}" if options else ""
 
     def _safe(self, text: str) -> str:
         return self._drawn(shown(text))

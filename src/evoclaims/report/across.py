@@ -38,7 +38,6 @@ def terminal(found: Across, width: int) -> list[Table]:
 
 
 def _part(found: Across, labels: Sequence[str]) -> Table:
-    """Return the columns of some environments."""
     shown = SpelledTable(pad_edge=False, box=None)
     shown.add_column("claim", no_wrap=True)
     for label in labels:

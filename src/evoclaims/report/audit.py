@@ -62,7 +62,6 @@ def undated(reports: Sequence[ClaimReport]) -> list[str]:
 
 
 def _kinds(ours: Sequence[ClaimReport], papers: Sequence[ClaimReport], agents: int) -> Iterator[tuple[str, list[str]]]:
-    """Yield each kind of finding with the findings."""
     satisfied = [(report, f"{report.name}: {', '.join(report.satisfied_by)}") for report in ours if report.satisfied_by]
     yield (
         f"supported and vacuous (satisfied by one of {plural(agents, 'null agent')})",
@@ -91,7 +90,8 @@ def _kinds(ours: Sequence[ClaimReport], papers: Sequence[ClaimReport], agents: i
     yield (
         "judged by a reading that was written after its trials ran",
         [
-            f"{report.name} ({report.outcome}): written {report.readings[0].since}, first trial {_date(report)}"
+            f"{report.name} ({report.outcome}): written {report.readings[0].since}, first trial "
+            + report.readings[0].trials_since[:16].replace("T", " ")  # to the minute
             for report in ours
             if report.readings and report.readings[0].late
         ],
@@ -113,8 +113,3 @@ def _kinds(ours: Sequence[ClaimReport], papers: Sequence[ClaimReport], agents: i
         [f"{report.name}: {power}" for report in ours if (power := table_cells.power(report))],
     )
     yield "claims without the paper's line or a date", undated(ours)
-
-
-def _date(report: ClaimReport) -> str:
-    """Return when the first trial behind a report started, to the minute."""
-    return report.readings[0].trials_since[:16].replace("T", " ")

@@ -112,6 +112,7 @@ class _Gathering:
         entries = self.history.get(key_of(report), ())
         tier = self.reproduction.tiers.get(report.tier)
         failing = self.failing.get((report.tier, report.name))
+        over = report.verdict.overspent if report.verdict else ""
         return Section(
             report=report,
             anchor=self.anchors.new(report.claim, report.case, report.tier),
@@ -126,7 +127,7 @@ class _Gathering:
                 *_broken(every),
                 *trial_summary.warnings(made),
                 *_edited(report),
-                *_overspent(report),
+                *([f"Over budget: {over}."] if over else []),
                 *filter(None, [failing]),
             ),
             history=eras(entries),
@@ -154,12 +155,6 @@ def _parts(report: ClaimReport, read: Mapping[str, Sequence[TrialSummary]]) -> t
     if report.verdict is not None and report.verdict.evidence:
         return judged_parts(report.verdict)
     return tuple(unjudged_part(label, trials) for label, trials in read.items() if trials)
-
-
-def _overspent(report: ClaimReport) -> tuple[str, ...]:
-    """Return a warning about trials that spent more than their budgets, if there is one."""
-    over = report.verdict.overspent if report.verdict else ""
-    return (f"Over budget: {over}.",) if over else ()
 
 
 def _edited(report: ClaimReport) -> list[str]:

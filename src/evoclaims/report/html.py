@@ -64,7 +64,6 @@ def opening_lines(page: Page) -> list[OpeningLine]:
 
 
 def _under_variants(page: Page, cases: list[Section]) -> dict[str, tuple[Robustness, ...]]:
-    """Return the cases of one sentence that were judged under each variant."""
     names = {(section.report.name, section.report.tier) for section in cases}
     rows = [row for row in page.robustness if (row.claim, row.tier) in names]
     return {variant: tuple(row for row in rows if variant in row.outcomes) for variant in page.tried}
@@ -171,7 +170,6 @@ def _pieces(page: Page) -> Iterator[tuple[str, str]]:
 
 
 def _chapters(page: Page) -> list[tuple[str, str, str]]:
-    """Return the parts below the claims that have something to show."""
     return [one for one in _CHAPTERS if getattr(page, one[0]) or (one == _FIGURES and page.missing)]
 
 

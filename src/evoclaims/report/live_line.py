@@ -96,7 +96,6 @@ def describe_all(overview: Overview) -> str:
 
 
 def _briefly(progress: RunProgress) -> str:
-    """Return condition, trials and step."""
     if not progress.total_steps:
         return printable(f"{progress.condition}: {progress.phase}")
     done = f"{progress.ended}/{progress.trials}, step {progress.steps:,}/{progress.total_steps:,}"

@@ -89,7 +89,6 @@ def _line(begin: str, names: Sequence[str], nothing: str) -> str:
 
 
 def _next(failed: Sequence[ClaimReport], changes: Sequence[str], first: bool) -> str:
-    """Return the command that helps most."""
     if failed:
         names = ",".join(dict.fromkeys(report.claim for report in failed[:_NAMED]))
         return f"evoclaims status --tier {failed[0].tier} --only {names} --why   (the reasons)"

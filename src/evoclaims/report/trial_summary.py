@@ -98,7 +98,6 @@ def _pairs(values: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
 
 
 def _text(value: Any) -> str:
-    """Return a JSON value in a few words."""
     if isinstance(value, dict):
         return listed((f"{name} {_text(part)}" for name, part in value.items()), most=40)
     return clean(value)
@@ -155,7 +154,6 @@ class Reader:
         return tuple(summary for summary in summaries if summary is not None)
 
     def _one(self, trial: str, versions: Versions | None) -> TrialSummary | None:
-        """Return a trial."""
         if trial not in self._read:
             try:
                 found = self._archive.get(trial, versions)
@@ -166,7 +164,6 @@ class Reader:
         return self._read[trial]
 
     def _summary(self, found: TrialResult) -> TrialSummary:
-        """Keep what is shown of a record."""
         self.settings.setdefault(found.condition, {k: v for k, v in found.spec.items() if k != "seed"})
         origin = Origin.of(found.provenance)
         reports = max(map(len, found.curves.values()), default=0)

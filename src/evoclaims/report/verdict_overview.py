@@ -111,7 +111,6 @@ def _letter(place: int) -> str:
 
 
 def _shown(versions: Iterable[tuple[str, str]], needed: Iterable[str]) -> Versions:
-    """Return the versions of Python and of what a trial depends on."""
     names = {*_SHOWN, *needed}
     known = dict(versions)
     return {name: known.get(name) or "none" for name in names}
@@ -119,20 +118,23 @@ def _shown(versions: Iterable[tuple[str, str]], needed: Iterable[str]) -> Versio
 
 def _table(name: str, says: str, columns: Iterable[str], rows: _Rows, made: Environments) -> str:
     lines = [
-        (literal(claim), literal(sentence), *(_cell(found[heading], made) for heading in columns))
+        (
+            *map(literal, (claim, sentence)),
+            *(_by_case((_verdict(one, made), one.case) for one in found[heading]) or NONE for heading in columns),
+        )
         for (claim, sentence), found in rows.items()
     ]
     return table((name, says, *map(literal, columns)), lines)
 
 
-def _cell(reports: Sequence[ClaimReport], made: Environments) -> str:
-    """Return the verdicts of a claim's cases, one line for all that are alike."""
+def _by_case(verdicts: Iterable[tuple[str, str]]) -> str:
+    """Return verdicts with their cases, one line for all cases that are alike."""
     alike: dict[str, list[str]] = defaultdict(list)
-    for report in reports:
-        alike[_verdict(report, made)].append(literal(report.case))
+    for verdict, case in verdicts:
+        alike[verdict].append(literal(case))
     if len(alike) == 1:
         return next(iter(alike))
-    return "<br>".join(f"{', '.join(cases)}: {verdict}" for verdict, cases in alike.items()) or NONE
+    return "<br>".join(f"{', '.join(cases)}: {verdict}" for verdict, cases in alike.items())
 
 
 def _verdict(report: ClaimReport, made: Environments) -> str:
@@ -188,7 +190,9 @@ def marks(
         named_cases = dict.fromkeys(report.case for reports in found.values() for report in reports)
         name = literal(named(claim, ", ".join(named_cases) if claim in several else ""))
         if not short or name in short:
-            text = short[name] if short else literal(_cut(sentence))
+            words = sentence.split()
+            first = sentence if len(words) <= WORDS else " ".join(words[:WORDS]) + " …"
+            text = short[name] if short else literal(first)
             rows.append((name, text, *(mark(found[heading]) for heading in columns)))
     return table((*HEADINGS, *map(literal, columns)), rows)
 
@@ -213,12 +217,6 @@ def short_sentences(text: str) -> dict[str, str]:
     _, _, *lines = [line for line in text.splitlines() if line.startswith("|")] or ["", ""]  # two are the heading
     rows = (line.strip("|\n ").split(" | ") for line in lines)
     return {cells[0]: cells[1] for cells in rows if len(cells) >= len(HEADINGS)}
-
-
-def _cut(sentence: str) -> str:
-    """Return the first words of a sentence."""
-    words = sentence.split()
-    return sentence if len(words) <= WORDS else " ".join(words[:WORDS]) + " …"
 
 
 YOUNGER: Final = "†"
@@ -263,14 +261,10 @@ def _since(found: Sequence[tuple[ClaimReport, ReadAs]]) -> str:
 
 
 def _verdicts(found: Sequence[tuple[ClaimReport, ReadAs]]) -> str:
-    """Return a reading's verdicts, one for all cases that are alike."""
-    alike: dict[str, list[str]] = defaultdict(list)
-    for report, one in found:
-        vacuous = ", vacuous" * (report.is_vacuous and one is report.readings[0])
-        alike[f"{literal(one.outcome)}{vacuous}"].append(literal(report.case))
-    if len(alike) == 1:
-        return next(iter(alike))
-    return "<br>".join(f"{', '.join(cases)}: {outcome}" for outcome, cases in alike.items())
+    vacuous = [", vacuous" * (report.is_vacuous and one is report.readings[0]) for report, one in found]
+    return _by_case(
+        (f"{literal(one.outcome)}{more}", report.case) for (report, one), more in zip(found, vacuous, strict=True)
+    )
 
 
 _OTHERS: Final = {CONTROL: "the benchmark itself", MECHANISM: "parts of methods and tasks"}
