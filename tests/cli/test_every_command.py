@@ -28,8 +28,6 @@ OF_STORES = {"verify", "merge"}
 """Commands that need no project."""
 UNSEEN = {"look", "reproduce", "compare", "tables"}
 """Commands that have nothing to do here, and say so first."""
-LATER = {"submit", "power", "watch", "across", "bisect"}
-"""Commands that look at devices when there is something to run, or leave that to others."""
 
 
 def asked(evoclaims: Evoclaims, command: str, *options: str) -> str:
@@ -46,7 +44,7 @@ def asked(evoclaims: Evoclaims, command: str, *options: str) -> str:
     [
         ("--tier=ful", "There is no tier named 'ful'. Did you mean 'full'?", set()),
         ("--variant=trade", "There is no variant named 'trade'. Did you mean 'traded'?", set()),
-        ("--device=tpu", "There is no device named 'tpu'. Did you mean 'gpu'?", UNSEEN | LATER),
+        ("--device=tpu", "There is no device named 'tpu'. Did you mean 'gpu'?", set()),
         ("--numprocesses=0", "--numprocesses takes a number from 1 up, or auto", set()),
         ("--storage=pyproject.toml", "is a file, not a folder", UNSEEN),
         ("--storage=claims", "is not a trial store", UNSEEN),

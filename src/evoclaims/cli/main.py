@@ -13,7 +13,7 @@ from pathlib import Path
 
 from evoclaims.cli.arguments import IN_PROCESSES, parser
 from evoclaims.cli.terminal import OutputError, plain_output
-from evoclaims.core.errors import UserError
+from evoclaims.core.errors import UserError, require_known
 from evoclaims.trials.stopping import end_without, interrupted_by
 
 USER_ERROR, INTERRUPTED, CLOSED_PIPE = 2, 130, 141
@@ -85,6 +85,10 @@ def _done(options: argparse.Namespace) -> int:
     _check_folder()
     from evoclaims.cli.store_folder import storage_of
 
+    if getattr(options, "device", "auto") != "auto":  # before a folder is made, or a job is submitted
+        from evoclaims.trials.devices import DEVICE_NAMES
+
+        require_known("device", options.device, DEVICE_NAMES)
     options.storage = storage_of(options.storage, options.command)
     if "numprocesses" in options:
         from evoclaims.execution.host import host_of
