@@ -8,8 +8,6 @@ from pathlib import Path
 
 import jax
 import pytest
-import temporary_folders
-from temporary_folders import ALIVE, temporary_folder
 from test_lanes import compilation_cache, tear
 
 from evoclaims.trials import devices
@@ -80,25 +78,3 @@ def test_beyond_a_bound_what_was_used_longest_ago_goes(tmp_path: Path, monkeypat
     assert not (tmp_path / "kernels" / "0.lock").exists()
     sweep(tmp_path, most=150)
     assert [path.exists() for path in made[4:]] == [False, False, False, True]
-
-
-def test_temporary_folders_of_killed_processes_go(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(temporary_folders.tempfile, "gettempdir", lambda: str(tmp_path))
-    monkeypatch.setattr(temporary_folders.tempfile, "mkdtemp", lambda prefix: str(_made(tmp_path / f"{prefix}new")))
-    monkeypatch.setattr(temporary_folders, "_held", [])
-    killed, young, foreign = (_made(tmp_path / f"evoclaims-{each}") for each in ("killed", "young", "foreign"))
-    for folder in (killed, young):
-        (folder / ALIVE).touch()
-    os.utime(killed / ALIVE, (1.0, 1.0))
-    living = temporary_folder()
-    assert not killed.exists()
-    assert young.exists()
-    assert foreign.exists()  # such as one of an earlier release, of which nobody knows whether it is used
-    os.utime(living / ALIVE, (1.0, 1.0))
-    temporary_folder("evoclaims-tests-")
-    assert living.exists()
-
-
-def _made(folder: Path) -> Path:
-    folder.mkdir()
-    return folder

@@ -43,30 +43,11 @@ def noted(function: Any, name: str, events: list[str]) -> Any:
     return called
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="glibc's allocator alone keeps what was freed")
-def test_freed_memory_goes_back_to_the_system() -> None:
-    if devices._libc() is None:
-        pytest.skip("another C library")
-
-    def resident() -> int:
-        return int(Path("/proc/self/statm").read_text().split()[1]) * 4096
-
-    devices.give_back()
-    held = [bytes(10_000) for _ in range(20_000)]  # smaller than what is mapped by itself
-    last = bytearray(10_000)  # keeps the heap from shrinking by itself
-    full = resident()
-    del held
-    devices.give_back()
-    assert resident() < full - 100_000_000
-    del last
-
-
 HEAPS = """
-import ctypes, sys, threading
+import ctypes, threading
 from evoclaims.trials import devices
 
-if sys.argv[1:]:
-    devices.share_heaps()
+devices.share_heaps()
 libc, all_there = ctypes.CDLL(None), threading.Barrier(8)
 libc.fopen.restype = ctypes.c_void_p
 
@@ -88,11 +69,8 @@ def test_threads_share_two_heaps(monkeypatch: pytest.MonkeyPatch) -> None:
     if devices._libc() is None:
         pytest.skip("another C library")
 
-    def heaps(*arguments: str) -> int:
-        command = [sys.executable, "-c", HEAPS, *arguments]
-        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.count("<heap nr=")
-
-    assert (heaps() > 2, heaps("shared")) == (True, 2)
+    told = subprocess.run([sys.executable, "-c", HEAPS], capture_output=True, text=True, check=True).stdout
+    assert told.count("<heap nr=") == 2
     calls: list[tuple[int, int]] = []
     monkeypatch.setattr(devices, "_libc", lambda: SimpleNamespace(mallopt=lambda *which: calls.append(which)))
     devices.configure()  # before jax makes its threads

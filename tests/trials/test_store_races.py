@@ -164,19 +164,15 @@ def test_a_trial_that_ended_in_another_process_meanwhile_is_not_replaced_by_one_
     assert kept.status == "done"
 
 
-@pytest.fixture(params=["links", "no links"])
-def file_system(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
-    """With and without hard links."""
-
+@pytest.mark.parametrize("links", [True, False])
+def test_a_file_written_once_stays_as_the_first_has_written_it_also_where_there_are_no_hard_links(
+    tmp_path: Path, links: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def refuse(*arguments: Any) -> None:
         raise PermissionError(1, "Operation not permitted")
 
-    if request.param == "no links":
+    if not links:
         monkeypatch.setattr(os, "link", refuse)
-    return str(request.param)
-
-
-def test_a_file_written_once_stays_as_the_first_has_written_it(tmp_path: Path, file_system: str) -> None:
     path = tmp_path / "folder" / "file"
     assert write_once(path, b"first") is True
     assert write_once(path, b"second") is False
