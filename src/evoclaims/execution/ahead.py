@@ -169,7 +169,6 @@ class Ahead:
         return TierRun(replace(self.order, tier=tier), seats, groups, jobs)
 
     def _run(self, runs: Sequence[TierRun]) -> None:
-        """Run everything, on a thread of its own."""
         try:
             for run in runs:
                 for ended in self._started(run.order, run.seats).run(run.groups):
