@@ -140,7 +140,11 @@ def test_a_trial_that_ran_out_of_time_gives_way_to_any_other_end_and_never_takes
     kept = store.get(ended.id)
     assert kept is not None
     assert (kept.status, sorted(store.champion_of(store.get(ended.id)))) == (status, sorted(parameters))
-    if status != "crashed":
+    if status == "crashed":
+        assert store.put(make_result(), {"w": np.ones(1)}) == "stored"
+        assert store.put(make_result(metrics={"mean_success": 0.0}), {"w": np.full(1, 2.0)}) == "differs"
+        assert store.champion_of(store.get(ended.id))["w"].tolist() == [1.0]
+    else:
         assert store.put(_timed_out(make_result, 50.0), {}) == "differs"
 
 

@@ -197,12 +197,12 @@ def _resumed(run: Run, interrupted: Header) -> Batch | None:
     folder, lanes = run.store.checkpoints, run.lanes
     owed = sum(not run.stored.has(seed) for seed in interrupted.seeds)
     run.watch(RunProgress(run.condition.label, "resuming", owed))
-    state = None
-    while state is None:
-        header = checkpoint.newest(folder, interrupted)
-        if header is None:
-            return None
+    while (header := checkpoint.newest(folder, interrupted)) is not None:
         state = checkpoint.restore(folder, header, lanes.shapes(len(header.lanes)))
+        if state is not None:
+            break
+    else:
+        return None
     stored = frozenset(filter(run.stored.has, header.seeds))
     if lanes.layout.alone:
         # Bits do not depend on other lanes: a lane whose trial is stored becomes idle, and costs nothing.
