@@ -51,10 +51,9 @@ class Answering(Walker):
 
 
 @pytest.mark.parametrize("what", BENDS)
-def test_a_policy_whose_answer_is_bent_is_refused_with_both_names(what: str, tmp_path: Any, cpus: list[Any]) -> None:
-    condition = Condition(Answering(bend=what), TASK, "direct", Budget(generations=1))
+def test_a_policy_whose_answer_is_bent_is_refused_with_both_names(what: str) -> None:
     with pytest.raises(UserError) as caught:
-        run(condition, [0], Store(tmp_path), cpus)
+        traced_progress(Answering(bend=what), TASK)
     text = str(caught.value)
     assert text.startswith(f"{BOTH}an action has shape ")
     assert what in text
@@ -199,8 +198,9 @@ def test_a_size_that_is_no_whole_number_is_refused(size: str, given: Any) -> Non
         traced_progress(Walker(), odd(3))
 
 
-@pytest.mark.parametrize("cost", [0, 2.5, None])
-@pytest.mark.parametrize("budget", [Budget(generations=1), Budget(environment_steps=8)], ids=["generations", "steps"])
+@pytest.mark.parametrize(
+    ("cost", "budget"), [(0, Budget(environment_steps=8)), (2.5, Budget(generations=1)), (None, Budget(generations=1))]
+)
 def test_a_step_that_costs_no_whole_number_of_environment_steps_is_refused(
     cost: Any, budget: Budget, tmp_path: Any, cpus: list[Any]
 ) -> None:
