@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import logging
-import warnings
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -132,38 +131,3 @@ def test_the_state_given_to_a_chunk_is_donated(cpus: list[Any]) -> None:
     before = lanes.start([0, 1], 2)
     lanes.advance(before, 1, 2)
     assert all(share.method.is_deleted() for share in before)
-
-
-@pytest.fixture
-def compilation_cache(tmp_path: Path) -> Iterator[Path]:
-    """A compilation cache of the test's own."""
-    from jax.experimental.compilation_cache import compilation_cache
-
-    options = {"jax_compilation_cache_dir": str(tmp_path / "xla"), "jax_persistent_cache_min_compile_time_secs": 0.0}
-    was = {name: getattr(jax.config, name) for name in options}
-    for name, value in options.items():
-        jax.config.update(name, value)
-    compilation_cache.reset_cache()
-    yield tmp_path / "xla"
-    for name, value in was.items():
-        jax.config.update(name, value)
-    compilation_cache.reset_cache()
-
-
-def tear(cache: Path) -> int:
-    """Cut every entry, as a kill can, since jax writes them in place; so does one process see what another writes."""
-    entries = list(cache.glob("*-cache"))
-    for entry in entries:
-        entry.write_bytes(entry.read_bytes()[:100])
-    jax.clear_caches()
-    return len(entries)
-
-
-def test_a_torn_entry_of_the_compilation_cache_costs_time_and_nothing_else(
-    tmp_path: Path, cpus: list[Any], compilation_cache: Path
-) -> None:
-    condition = walk(steps=7)
-    wanted = run(condition, [0], Store(tmp_path / "one"), cpus)
-    assert tear(compilation_cache) >= 3
-    with warnings.catch_warnings(action="error"):
-        assert run(condition, [0], Store(tmp_path / "two"), cpus)[0].digest == wanted[0].digest
