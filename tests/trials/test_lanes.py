@@ -46,6 +46,7 @@ def test_lanes_halve_as_trials_end_on_no_more_devices_than_there_are_trials(full
     for active, width in enumerate(widths):
         assert width % used == 0
         assert max(active, 1) <= width <= full + used - 1
+        assert width < 2 * max(active, 1) + used
     assert len(set(widths)) <= full.bit_length() + 1  # so that few are compiled
     alone = _lanes(devices, Layout.ALONE)  # on a CPU every lane is a call of its own on one device
     assert {alone.width(active, full) for active in range(full + 1)} == {full}
