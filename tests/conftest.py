@@ -20,8 +20,6 @@ import pytest
 from hypothesis import settings
 from temporary_folders import temporary_folder
 
-from evoclaims.trials.devices import give_back, share_heaps
-
 pytest_plugins = ["hand_made_paper", "pytester", "tiny_project"]
 
 # No test fails on a slow machine for being slow.
@@ -30,7 +28,6 @@ settings.load_profile("untimed")
 
 # Tracing makes many small objects that live: looking through all of them often took a seventh of the time.
 gc.set_threshold(100_000, 20, 20)
-share_heaps()  # as a run does, before jax makes its threads
 
 _CACHE: Final = "JAX_COMPILATION_CACHE_DIR"
 _made = ""
@@ -50,6 +47,10 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in what a shell runs
 if _CACHE not in os.environ:
     _made = os.environ[_CACHE] = str(temporary_folder("evoclaims-tests-"))
     os.environ["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0"  # an entry is read ten times as fast as compiled
+
+from evoclaims.trials.devices import give_back, share_heaps  # noqa: E402  (it imports jax, which reads what is set above)
+
+share_heaps()  # as a run does, before jax makes its threads
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -42,9 +42,3 @@ def test_no_two_texts_share_a_name_that_is_too_long_for_a_file(pairs: list[tuple
     names = [file_name(*pair) for pair in pairs]
     assert len(set(names)) == 2
     assert all(0 < len(name.encode("ascii")) <= LONGEST for name in names)
-
-
-def test_long_texts_that_begin_alike_are_told_apart() -> None:
-    names = {file_name("G1", "x" * length) for length in range(100, 400)}
-    assert len(names) == 300
-    assert max(map(len, names)) == LONGEST

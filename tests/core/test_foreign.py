@@ -8,13 +8,10 @@ import sys
 from evoclaims.core.foreign import imported_when_called
 
 QDAX = """
-import sys, jax
-from evoclaims.methods.map_elites import MapElites, _repertoire
-loaded = lambda: [name for name in ("sklearn", "sklearn.cluster", "pandas") if name in sys.modules]
+import sys
+from evoclaims.methods.map_elites import MapElites
 MapElites()._algorithm()
-print(loaded())
-centroids = _repertoire().compute_cvt_centroids(2, 50, 4, 0.0, 1.0, jax.random.key(0))
-print(centroids.shape, loaded()[:2])
+print([name for name in ("sklearn", "sklearn.cluster", "pandas") if name in sys.modules])
 """
 
 
@@ -31,6 +28,6 @@ def test_a_stand_in_calls_the_module_and_leaves_no_trace() -> None:
     assert sys.modules["colorsys"] is colorsys
 
 
-def test_map_elites_needs_no_scikit_learn_until_cells_are_drawn_by_clustering() -> None:
+def test_map_elites_needs_no_scikit_learn() -> None:
     ran = subprocess.run([sys.executable, "-c", QDAX], capture_output=True, text=True, check=False)
-    assert ran.stdout.splitlines() == ["[]", "(4, 2) ['sklearn', 'sklearn.cluster']"], ran.stderr
+    assert ran.stdout.splitlines() == ["[]"], ran.stderr

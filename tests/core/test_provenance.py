@@ -25,17 +25,11 @@ def repository(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def commit(folder: Path, text: str) -> None:
-    """Commit a file `code.py` with `text`."""
-    (folder / "code.py").write_text(text)
-    who = ["-c", "user.name=someone", "-c", "user.email=someone@example.org"]
-    subprocess.run(["git", "add", "code.py"], check=True)
-    subprocess.run(["git", *who, "commit", "--quiet", "-m", "a change"], check=True)
-
-
-def test_provenance_is_plain_json_with_every_part() -> None:
+def test_provenance_is_plain_json_with_every_part_looked_up_once(monkeypatch: pytest.MonkeyPatch) -> None:
     found = provenance.collect()
     assert json.loads(json.dumps(found)) == found
+    device = jax.devices()[0]
+    assert found["device"] == {"platform": device.platform, "kind": device.device_kind, "count": len(jax.devices())}
     assert set(found) == {
         "git",
         "versions",
@@ -48,6 +42,9 @@ def test_provenance_is_plain_json_with_every_part() -> None:
         "cuda",
         "prng",
     }
+    found["versions"]["numpy"] = "changed"  # in this copy alone
+    monkeypatch.setattr(provenance, "git_state", lambda: pytest.fail("looked up again"))
+    assert provenance.collect()["versions"]["numpy"] == numpy.__version__
 
 
 def test_versions_name_every_package_and_say_null_for_an_absent_one(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -110,65 +107,31 @@ def test_bits_hang_on_the_kind_of_device_and_on_cuda_where_a_gpu_is_used() -> No
     assert provenance.what_fixes_bits(gpu)["kind"] == "H200"
 
 
-def test_the_device_is_the_one_jax_uses() -> None:
-    devices = jax.devices()
-    assert provenance.collect()["device"] == {
-        "platform": devices[0].platform,
-        "kind": devices[0].device_kind,
-        "count": len(devices),
-    }
-
-
-def test_a_caller_that_changes_its_copy_changes_no_other() -> None:
-    provenance.collect()["versions"]["numpy"] = "changed"
-    assert provenance.collect()["versions"]["numpy"] == numpy.__version__
-
-
-def test_the_lookup_happens_once_per_process(monkeypatch: pytest.MonkeyPatch) -> None:
-    provenance.collect()
-    monkeypatch.setattr(provenance, "git_state", lambda: pytest.fail("looked up again"))
-    provenance.collect()
-
-
 def test_the_machine_class_is_one_line_that_starts_with_the_system() -> None:
     machine = provenance.machine_class()
     assert machine.split()[0] in {"Linux", "Darwin", "Windows"}
     assert machine == " ".join(machine.split())
 
 
-def test_a_clean_repository_gives_its_commit(repository: Path) -> None:
-    commit(repository, "x = 1\n")
-    head = subprocess.run(["git", "rev-parse", "HEAD"], capture_output=True, text=True, check=True).stdout.strip()
-    assert provenance.git_state() == {"sha": head, "dirty": False}
+def test_a_repository_gives_its_commit_and_is_dirty_when_a_tracked_file_was_edited(repository: Path) -> None:
+    def git(*arguments: str) -> str:
+        who = ["-c", "user.name=someone", "-c", "user.email=someone@example.org"]
+        return subprocess.run(["git", *who, *arguments], capture_output=True, text=True, check=True).stdout.strip()
 
-
-def test_an_edited_tracked_file_makes_the_repository_dirty(repository: Path) -> None:
-    commit(repository, "x = 1\n")
-    (repository / "code.py").write_text("x = 2\n")
-    state = provenance.git_state()
-    assert state is not None
-    assert state["dirty"] is True
-
-
-def test_an_untracked_file_does_not_make_the_repository_dirty(repository: Path) -> None:
-    commit(repository, "x = 1\n")
-    (repository / "notes.txt").write_text("results\n")
-    state = provenance.git_state()
-    assert state is not None
-    assert state["dirty"] is False
-
-
-def test_a_repository_without_commits_has_no_sha(repository: Path) -> None:
     assert provenance.git_state() == {"sha": None, "dirty": False}
+    (repository / "code.py").write_text("x = 1\n")
+    git("add", "code.py")
+    git("commit", "--quiet", "-m", "a change")
+    (repository / "notes.txt").write_text("results\n")  # which is not tracked
+    assert provenance.git_state() == {"sha": git("rev-parse", "HEAD"), "dirty": False}
+    (repository / "code.py").write_text("x = 2\n")
+    assert provenance.git_state() == {"sha": git("rev-parse", "HEAD"), "dirty": True}
 
 
-def test_a_folder_outside_any_repository_has_no_git_state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_repository_or_git_there_is_no_git_state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("GIT_CEILING_DIRECTORIES", str(tmp_path.parent))
     assert provenance.git_state() is None
-
-
-def test_a_machine_without_git_has_no_git_state(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
     assert provenance.git_state() is None
 

@@ -1,7 +1,6 @@
 """A real SLURM on this machine, in a folder: a controller, several nodes, and the munge by which they trust each other.
 
-Wanted: Debian's slurm-wlm and munge, and root, as in a container. `python tests/slurm/cluster.py` starts one, prints
-how to talk to it, and ends it with Ctrl-C.
+Wanted: Debian's slurm-wlm and munge, and root, as in a container.
 """
 
 from __future__ import annotations
@@ -13,8 +12,6 @@ import shutil
 import signal
 import socket
 import subprocess
-import sys
-import tempfile
 import time
 from pathlib import Path
 from typing import Final
@@ -187,26 +184,3 @@ def _wait_for(condition, what: str, seconds: float = 60.0) -> None:  # type: ign
         if time.monotonic() > until:
             raise RuntimeError(f"{what} after {seconds:g} s")
         time.sleep(0.2)
-
-
-def main() -> None:
-    """Start a cluster of two nodes and keep it until Ctrl-C."""
-    if lacks():
-        raise SystemExit(f"This machine lacks {lacks()}.")
-    folder = Path(tempfile.mkdtemp(prefix="slurm-"))
-    cluster = Cluster(folder)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        cluster.start()
-        print(f"export SLURM_CONF={cluster.environment['SLURM_CONF']}", flush=True)
-        while True:
-            time.sleep(3600)
-    except KeyboardInterrupt:
-        pass
-    finally:
-        cluster.stop()
-        shutil.rmtree(folder, ignore_errors=True)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

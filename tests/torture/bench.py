@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from tortured_project import PYPROJECT, TRIALS, claims
+from tortured_project import CLAIMS, METHODS, PYPROJECT, TRIALS
 
 import evoclaims
 
@@ -109,15 +109,11 @@ class Bench:
 
     Attributes:
         pause: seconds that a process rests at every report.
-        further: how many methods the paper has beside its three, each with a condition and a claim.
-        lease: seconds that a notice counts for.
         kept: whether the folder is to stay, since something was found.
     """
 
     folder: Path
     pause: float = 0.08
-    further: int = 0
-    lease: float = LEASE
     kept: bool = False
     started: list[Running] = field(default_factory=list)
     _events: list[dict[str, Any]] = field(default_factory=list)
@@ -127,16 +123,16 @@ class Bench:
     def __post_init__(self) -> None:
         (self.folder / "claims").mkdir(parents=True)
         (self.folder / "pyproject.toml").write_text(PYPROJECT)
-        (self.folder / "claims" / "test_claims.py").write_text(claims(self.further))
+        (self.folder / "claims" / "test_claims.py").write_text(CLAIMS)
 
     @property
     def store(self) -> Path:
         return self.folder / ".evoclaims"
 
-    def pytest(self, workers: int = 2, arguments: Sequence[str] = (), **surroundings: Any) -> Running:
-        """Start pytest with so many workers, 0 for none, and further arguments."""
+    def pytest(self, workers: int = 2, **surroundings: Any) -> Running:
+        """Start pytest with so many workers, 0 for none."""
         name = self.folder / f"verdicts-{next(self._numbers)}.json"
-        options = [f"--claims-json={name}", *([f"-n{workers}"] if workers else ()), *arguments]
+        options = [f"--claims-json={name}", *([f"-n{workers}"] if workers else ())]
         return self._start(["-m", "pytest", *options], json_file=name, **surroundings)
 
     def evoclaims(self, *arguments: str, **surroundings: Any) -> Running:
@@ -144,28 +140,15 @@ class Bench:
         code = "import sys; from evoclaims.cli import main; sys.exit(main())"
         return self._start(["-c", code, *arguments], **surroundings)
 
-    def python(self, code: str) -> Running:
-        """Start a program."""
-        return self._start(["-c", code])
-
-    def forget_events(self) -> None:
-        """Begin anew to read what processes say."""
-        self._events, self._read = [], 0
-
     def _start(
         self,
         arguments: Sequence[str],
         host: str = "",
         clock: Path | None = None,
         json_file: Path | None = None,
-        wrapped: Sequence[str] = (),
-        cache: Path | None = None,
     ) -> Running:
-        """Start Python in the project.
-
-        On a host of this name, with a clock that is wrong by what a file says, by another program, with another cache.
-        """
-        command = [*wrapped, sys.executable, *arguments]
+        """Start Python in the project, on a host of this name, with a clock that is wrong by what a file says."""
+        command = [sys.executable, *arguments]
         source = Path(evoclaims.__file__).parents[1]
         given = filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))
         paths = [HERE / "shims", HERE, HERE.parent / "trials", source, *given]
@@ -175,23 +158,14 @@ class Bench:
             "COLUMNS": "200",
             "TORTURE_LOG": str(self.folder / "log"),
             "TORTURE_PAUSE": str(self.pause),
-            "TORTURE_LEASE": str(self.lease),
-            "TORTURE_FURTHER": str(self.further),
+            "TORTURE_LEASE": str(LEASE),
             **({"TORTURE_CLOCK": str(clock)} if clock else {}),
-            **({"JAX_COMPILATION_CACHE_DIR": str(cache)} if cache else {}),
         }
         for name in ("PYTEST_ADDOPTS", "PYTEST_XDIST_WORKER", "PYTEST_CURRENT_TEST", "GITHUB_STEP_SUMMARY"):
             environment.pop(name, None)
         if host and hosts_are_real():
-            command = [
-                "unshare",
-                "--uts",
-                "sh",
-                "-c",
-                'echo "$0" > /proc/sys/kernel/hostname; exec "$@"',
-                host,
-                *command,
-            ]
+            renamed = 'echo "$0" > /proc/sys/kernel/hostname; exec "$@"'
+            command = ["unshare", "--uts", "sh", "-c", renamed, host, *command]
         elif host:
             environment["TORTURE_HOST"] = host
         output = self.folder / f"output-{next(self._numbers)}.txt"
@@ -255,20 +229,15 @@ class Truth:
 
 @dataclass
 class Laboratory:
-    """Where attacks take place, and the truth that they must not change.
-
-    Attributes:
-        seconds: how long an attack lasts that is not counted in blows.
-    """
+    """Where attacks take place, and the truth that they must not change."""
 
     folder: Path
-    seconds: float = 480.0
     _numbers: Iterator[int] = field(default_factory=itertools.count)
 
     @contextmanager
-    def bench(self, pause: float = 0.08, further: int = 0, lease: float = LEASE) -> Iterator[Bench]:
+    def bench(self, pause: float = 0.08) -> Iterator[Bench]:
         """Give a new project; it goes when nothing was found, and stays to be looked at when something was."""
-        bench = Bench(self.folder / f"bench-{next(self._numbers)}", pause, further, lease)
+        bench = Bench(self.folder / f"bench-{next(self._numbers)}", pause)
         try:
             yield bench
         finally:
@@ -278,19 +247,15 @@ class Laboratory:
 
     @functools.cached_property
     def truth(self) -> Truth:
-        """What the paper's three methods come to."""
-        return self.undisturbed()
-
-    def undisturbed(self, further: int = 0, workers: int = 0) -> Truth:
-        """Run everything undisturbed, with so many further methods, and with so many workers."""
-        with self.bench(pause=0.0, further=further) as bench:
-            running = bench.pytest(workers)
+        """What a run of everything comes to."""
+        with self.bench(pause=0.0) as bench:
+            running = bench.pytest(0)
             running.end()
             digests = digests_of(bench.records())
             truth = Truth(digests, running.verdicts())
             outcomes = {claim["outcome"] for claim in truth.verdicts}
-            assert len(digests) == TRIALS * (3 + further), running.output
-            assert len(truth.verdicts) == 5 + further, running.output
+            assert len(digests) == TRIALS * len(METHODS), running.output
+            assert len(truth.verdicts) == 5, running.output
             assert len(outcomes - {"error"}) > 1, running.output
         return truth
 

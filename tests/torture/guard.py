@@ -37,10 +37,6 @@ class Guard:
         times = Counter(line["id"] for line in self._puts())
         return times - Counter(times.keys())
 
-    def forget(self) -> None:
-        """Look at a new store from now on."""
-        self._seen = {}
-
     def look(self) -> None:
         """Nothing that was stored is lost or changed; to be called at any moment."""
         said = {line["id"] for line in self._puts()}

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from tortured_project import REPORTS, TRIALS, methods
+from tortured_project import REPORTS, TRIALS
 from trial_toys import Walker
 
 from evoclaims.claims import fetching
@@ -33,8 +33,6 @@ METHODS: dict[str, Method[Any]] = {
     "steady": Walker(chance=0.03),
     "fragile": Walker(0.03, hazard=0.004),
 }
-for number, name in enumerate(methods(int(os.environ.get("TORTURE_FURTHER", "0")))):
-    METHODS.setdefault(name, Walker(chance=0.02 + 1e-5 * number))
 CONDITIONS = {
     (name, "parity"): Condition(method, NParity(4), "curriculum", Budget(generations=100, reports=REPORTS))
     for name, method in METHODS.items()
@@ -45,9 +43,6 @@ REPRODUCTION = Reproduction(
     folder=Path(__file__).parent,
     tiers={name: Tier(CONDITIONS, Design.fixed(TRIALS)) for name in ("smoke", "full")},
 )
-
-NAMES = {condition.id: name for (name, _), condition in CONDITIONS.items()}
-"""Of conditions; the paper that runs on SLURM has others, and imports this one for what it says."""
 
 _log = os.open(os.environ["TORTURE_LOG"], os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o644)
 _held = Path(f"{os.environ['TORTURE_LOG']}-held-{os.getpgrp()}")
@@ -79,7 +74,7 @@ def _slowly(
 
 def _telling(store: Store, result: TrialResult, champion: Any) -> Any:
     became = _put(store, result, champion)
-    say("put", condition=result.condition, name=NAMES.get(result.condition), id=result.id, became=became)
+    say("put", condition=result.condition, id=result.id, became=became)
     return became
 
 

@@ -8,6 +8,8 @@ TRIALS = 10
 REPORTS = 25
 """Reports of each."""
 
+METHODS = ("quick", "steady", "fragile")
+
 PYPROJECT = """
 [tool.evoclaims]
 reproduction = "tortured_paper"
@@ -21,46 +23,23 @@ addopts = [
 filterwarnings = ["error"]
 """
 
-CLAIMS = """
+_HEAD = """
 from evoclaims import claim
 
 def says(name):
     return claim(name, says=f"{name} at full size", where="§1", smoke=f"{name} in small")
-
-@says("quick")
-def test_quick(trials, verdict):
-    verdict(trials("quick", on="parity").solves_every_level.in_most_trials())
-
-@says("steady")
-def test_steady(trials, verdict):
-    verdict(trials("steady", on="parity").solves_every_level.in_most_trials())
-
-@says("fragile")
-def test_fragile(trials, verdict):
-    verdict(trials("fragile", on="parity").solves_every_level.in_most_trials())
-
-@says("quick-steady")
-def test_quick_is_above_steady(trials, verdict):
-    verdict(trials("quick", on="parity").last_success > trials("steady", on="parity").last_success)
-
-@says("steady-fragile")
-def test_steady_is_above_fragile(trials, verdict):
-    verdict(trials("steady", on="parity").last_success > trials("fragile", on="parity").last_success)
 """
 
-
-CLAIM = """
-@says("{name}")
-def test_{name}(trials, verdict):
-    verdict(trials("{name}", on="parity").solves_every_level.in_most_trials())
+_OF_ONE = """
+@says("{0}")
+def test_{0}(trials, verdict):
+    verdict(trials("{0}", on="parity").solves_every_level.in_most_trials())
 """
 
+_OF_TWO = """
+@says("{0}-{1}")
+def test_{0}_is_above_{1}(trials, verdict):
+    verdict(trials("{0}", on="parity").last_success > trials("{1}", on="parity").last_success)
+"""
 
-def methods(further: int) -> list[str]:
-    """Return the names of the paper's three methods and of so many further ones."""
-    return ["quick", "steady", "fragile", *(f"walker{number:05}" for number in range(further))]
-
-
-def claims(further: int) -> str:
-    """Return the module of claims: those on the three methods, and one on each further method."""
-    return CLAIMS + "".join(CLAIM.format(name=name) for name in methods(further)[3:])
+CLAIMS = _HEAD + "".join(map(_OF_ONE.format, METHODS)) + "".join(map(_OF_TWO.format, METHODS, METHODS[1:]))

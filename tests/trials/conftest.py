@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import json
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -102,6 +103,40 @@ def cpus() -> list[Any]:
     import jax
 
     return list(jax.devices("cpu")[:2])
+
+
+class _Lowered:
+    """A program that is compiled once, however often it is asked for."""
+
+    def __init__(self, program: Any) -> None:
+        self._program, self._compiled = program, None
+
+    def compile(self, options: Any) -> Any:
+        self._compiled = self._compiled or self._program.compile(options)
+        return self._compiled
+
+
+_lowered: dict[Any, _Lowered] = {}
+"""The programs of lanes by condition, function, layout, device and shapes."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compiled_once() -> Iterator[None]:
+    """Trace and compile equal programs once for all tests: most runs here differ in what becomes of them alone."""
+    from evoclaims.trials import lanes
+
+    lower, program = lanes.Lanes._lowered, lanes.Program
+
+    def lowered(self: lanes.Lanes, function: Any, home: Any, arguments: Any, donate: bool = False) -> Any:
+        key = self.condition, function.__name__, self.layout, home, str(arguments), donate
+        if key not in _lowered:
+            _lowered[key] = _Lowered(lower(self, function, home, arguments, donate))
+        return _lowered[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(lanes.Lanes, "_lowered", lowered)
+        patch.setattr(lanes, "Program", functools.cache(program))
+        yield
 
 
 @pytest.fixture(scope="session")

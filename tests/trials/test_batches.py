@@ -20,32 +20,22 @@ from evoclaims.trials.store import Store
 pytestmark = pytest.mark.oldest
 
 
-def test_a_checkpoint_of_another_platform_is_passed_over(
-    store: Store, cpus: list[Any], uninterrupted: list[TrialResult], monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("part", ["machine", "prng"])
+def test_a_checkpoint_of_another_platform_is_passed_over_and_stays_while_it_owes_a_trial(
+    part: str, store: Store, cpus: list[Any], uninterrupted: list[TrialResult], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as patch:
-        patch.setattr("evoclaims.trials.result_making.collect", lambda: {**collect(), "machine": "another"})
-        with pytest.raises(StoppedError):
-            run_climbers(store, cpus, stopping(2))
-    log = Log()
-    assert digests(run_climbers(store, cpus, log)) == digests(uninterrupted)
-    assert "resuming" not in log.phases()
-    assert not list(store.checkpoints.iterdir())  # it owed nothing any more
-
-
-def test_a_checkpoint_of_another_platform_stays_while_it_owes_a_trial(
-    store: Store, cpus: list[Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with monkeypatch.context() as patch:
-        patch.setattr("evoclaims.trials.result_making.collect", lambda: {**collect(), "prng": "another"})
+        patch.setattr("evoclaims.trials.result_making.collect", lambda: {**collect(), part: "another"})
         with pytest.raises(StoppedError):
             run_climbers(store, cpus, stopping(1))
     (path,) = store.checkpoints.iterdir()
-    owed = [seed for seed in checkpoint.sound_ones(store.checkpoints, CLIMBING.id)[0].lanes if seed is not None]
-    run_climbers(store, cpus, seeds=owed[1:])
+    owed = checkpoint.sound_ones(store.checkpoints, CLIMBING.id)[0].seeds
+    log = Log()
+    run_climbers(store, cpus, log, seeds=owed[1:])
     assert list(store.checkpoints.iterdir()) == [path]
-    run_climbers(store, cpus, seeds=owed[:1])
+    assert digests(run_climbers(store, cpus, log)) == digests(uninterrupted)
     assert list(store.checkpoints.iterdir()) == []
+    assert "resuming" not in log.phases()
 
 
 def test_an_interrupted_batch_waits_until_one_of_its_trials_is_asked_for(
@@ -64,19 +54,6 @@ def test_an_interrupted_batch_waits_until_one_of_its_trials_is_asked_for(
     assert puts == Counter([3, 1, 5])
 
 
-def test_a_checkpoint_whose_trials_are_all_stored_is_removed(
-    store: Store, cpus: list[Any], uninterrupted: list[TrialResult]
-) -> None:
-    with pytest.raises(StoppedError):
-        run_climbers(store, cpus, stopping(1))
-    for result in uninterrupted:
-        store.put(result, {})
-    log = Log()
-    assert digests(run_climbers(store, cpus, log, seeds=[*SEEDS, 0]))[:-1] == digests(uninterrupted)
-    assert log.phases() == ["compiling", "training"]
-    assert not list(store.checkpoints.iterdir())
-
-
 def test_a_checkpoint_that_a_kill_left_behind_goes_though_nothing_is_missing(
     store: Store, cpus: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -89,17 +66,6 @@ def test_a_checkpoint_that_a_kill_left_behind_goes_though_nothing_is_missing(
     monkeypatch.setattr("evoclaims.trials.runner.Lanes", None)
     run_climbers(store, cpus)
     assert list(store.checkpoints.iterdir()) == [torn]  # left for `evoclaims verify`
-
-
-def test_more_trials_may_be_asked_for_than_the_stopped_run_had(
-    store: Store, cpus: list[Any], uninterrupted: list[TrialResult], puts: Counter[int]
-) -> None:
-    with pytest.raises(StoppedError):
-        run_climbers(store, cpus, stopping(2), seeds=[1, 5])
-    log = Log()
-    assert digests(run_climbers(store, cpus, log)) == digests(uninterrupted)
-    assert log.phases() == ["resuming", "training", "compiling"]
-    assert puts == Counter(SEEDS)
 
 
 @pytest.fixture
@@ -166,22 +132,15 @@ def test_side_by_side_a_batch_ends_when_nothing_is_owed_though_a_stored_trial_ru
     assert max(others) <= max(steps for steps, _ in side_by_side) < late.metrics["steps"]
 
 
-def test_side_by_side_a_batch_goes_on_with_as_many_devices_as_it_had(
-    store: Store, cpus: list[Any], side_by_side: list[tuple[int, int]]
+@pytest.mark.parametrize("layout", Layout)
+def test_side_by_side_a_batch_goes_on_with_as_many_devices_as_it_had_and_alone_with_any_number(
+    layout: Layout, store: Store, cpus: list[Any], uninterrupted: list[TrialResult], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Lanes share a device there: the width on each would be another one."""
+    """Lanes share a device side by side: the width on each would be another one."""
+    monkeypatch.setattr("evoclaims.trials.lanes.layout_on", lambda platform: layout)
     with pytest.raises(StoppedError):
         run_climbers(store, cpus, stopping(1))
     log = Log()
-    run_climbers(store, cpus[:1], log)
-    assert "resuming" not in log.phases()
-
-
-def test_one_after_the_other_a_batch_goes_on_with_any_number_of_devices(
-    store: Store, cpus: list[Any], uninterrupted: list[TrialResult]
-) -> None:
-    with pytest.raises(StoppedError):
-        run_climbers(store, cpus, stopping(1))
-    log = Log()
-    assert digests(run_climbers(store, cpus[:1], log)) == digests(uninterrupted)
-    assert log.phases()[0] == "resuming"
+    results = run_climbers(store, cpus[:1], log)
+    assert ("resuming" in log.phases()) is layout.alone
+    assert not layout.alone or digests(results) == digests(uninterrupted)

@@ -87,5 +87,6 @@ def test_only_trials_that_nobody_has_stored_meanwhile_are_begun(
     def run_the_other() -> None:
         run_climbers(interrupted, cpus, seeds=[6])
 
-    run_climbers(interrupted, cpus, between_header_and_state(run_the_other), seeds=[*SEEDS, 6])
+    results = run_climbers(interrupted, cpus, between_header_and_state(run_the_other), seeds=[*SEEDS, 6])
+    assert digests(results[:-1]) == digests(uninterrupted)
     assert puts[6] == 1

@@ -51,10 +51,9 @@ class Answering(Walker):
 
 
 @pytest.mark.parametrize("what", BENDS)
-def test_a_policy_whose_answer_is_bent_is_refused_with_both_names(what: str, tmp_path: Any, cpus: list[Any]) -> None:
-    condition = Condition(Answering(bend=what), TASK, "direct", Budget(generations=1))
+def test_a_policy_whose_answer_is_bent_is_refused_with_both_names(what: str) -> None:
     with pytest.raises(UserError) as caught:
-        run(condition, [0], Store(tmp_path), cpus)
+        traced_progress(Answering(bend=what), TASK)
     text = str(caught.value)
     assert text.startswith(f"{BOTH}an action has shape ")
     assert what in text
@@ -135,12 +134,6 @@ def test_a_step_that_gives_something_else_is_refused(sentence: str) -> None:
     assert str(caught.value) == BOTH + sentence
 
 
-def test_metrics_that_are_whole_numbers_fit() -> None:
-    counts = {"n": jnp.int32(3), "b": jnp.array(True)}
-    method = Stepping(give=lambda state, told: (state, replace(told, metrics=counts)))
-    assert traced_progress(method, TASK).metrics.keys() == {"n", "b"}
-
-
 @dataclass(frozen=True)
 class Bent(NParity):
     """4-parity whose states are bent."""
@@ -158,6 +151,7 @@ class Bent(NParity):
 
 
 STATES: dict[str, Any] = {
+    "a tuple, not a TaskState.": lambda made: (made.observation, made.reward),
     "an observation of shape (1, 3) and type float32, not of shape (3,) and type float32.": (
         lambda made: replace(made, observation=made.observation[None])
     ),
@@ -182,32 +176,31 @@ def test_a_task_that_gives_something_else_is_refused(what: str, only: str) -> No
     with pytest.raises(UserError) as caught:
         traced_progress(Walker(), Bent(3, bend=STATES[what], only=only))
     assert str(caught.value) == f"{BOTH}the {only} of 'n_parity' gives {what}"
-
-
-@pytest.mark.parametrize("only", ["reset", "step"])
-def test_a_task_that_gives_no_task_state_is_refused(only: str) -> None:
-    task = Bent(3, bend=lambda made: (made.observation, made.reward), only=only)
-    with pytest.raises(UserError, match=f"{BOTH}the {only} of 'n_parity' gives a tuple, not a TaskState"):
+    task = Bent(3, bend=lambda made: replace(made, inner=replace(made.inner, level=made.reward)), only="step")
+    with pytest.raises(UserError, match=r"'n_parity' changes its state by a step: \.level is of shape \(\) and type"):
         traced_progress(Walker(), task)
 
 
-@pytest.mark.parametrize("size", ["action_size", "horizon", "levels"])
-def test_a_task_without_actions_time_or_levels_is_refused(size: str) -> None:
-    empty = type("Empty", (NParity,), {size: 0})
-    with pytest.raises(UserError, match=f"{BOTH}'n_parity' has {size} = 0, and it takes a whole number, at least 1"):
-        traced_progress(Walker(), empty(3))
-
-
-@pytest.mark.parametrize("size", ["observation_size", "action_size", "horizon", "levels"])
-@pytest.mark.parametrize("given", ["3", 3.0])
+@pytest.mark.parametrize(
+    ("size", "given"),
+    [
+        ("observation_size", "3"),
+        ("action_size", 0),
+        ("action_size", 3.0),
+        ("horizon", 0),
+        ("levels", 0),
+        ("levels", 3.0),
+    ],
+)
 def test_a_size_that_is_no_whole_number_is_refused(size: str, given: Any) -> None:
     odd = type("Odd", (NParity,), {size: given})
-    with pytest.raises(UserError, match=f"{BOTH}'n_parity' has {size} = {given!r}, and it takes a whole number"):
+    with pytest.raises(UserError, match=f"{BOTH}'n_parity' has {size} = {given!r}, and it takes a whole number, at le"):
         traced_progress(Walker(), odd(3))
 
 
-@pytest.mark.parametrize("cost", [0, -1, 2.5, None])
-@pytest.mark.parametrize("budget", [Budget(generations=1), Budget(environment_steps=8)], ids=["generations", "steps"])
+@pytest.mark.parametrize(
+    ("cost", "budget"), [(0, Budget(environment_steps=8)), (2.5, Budget(generations=1)), (None, Budget(generations=1))]
+)
 def test_a_step_that_costs_no_whole_number_of_environment_steps_is_refused(
     cost: Any, budget: Budget, tmp_path: Any, cpus: list[Any]
 ) -> None:
@@ -227,12 +220,6 @@ def test_the_engine_keeps_the_names_of_all_its_own_numbers(tmp_path: Any, cpus: 
     (trial,) = run(Condition(Walker(), TASK, "direct", Budget(generations=1)), [0], Store(tmp_path), cpus)
     assert sorted(trial.metrics) == sorted(METRICS)
     assert set(trial.curves) - {"first"} == set(CURVES)
-
-
-def test_a_task_whose_step_changes_its_state_is_refused() -> None:
-    task = Bent(3, bend=lambda made: replace(made, inner=replace(made.inner, level=made.reward)), only="step")
-    with pytest.raises(UserError, match=r"'n_parity' changes its state by a step: \.level is of shape \(\) and type"):
-        traced_progress(Walker(), task)
 
 
 @dataclass(frozen=True)
@@ -282,7 +269,9 @@ BITS = np.ones((4, 2), np.float32)
         ),
         ((BITS, YES, YES, (2, 5)), "table has rows_at_level=(2, 5): write numbers above 0 that increase up to 4"),
         ((BITS, YES, YES, (3, 2)), "table has rows_at_level=(3, 2): write numbers above 0 that increase up to 4"),
+        ((BITS, YES, YES, (2, 3)), "table has rows_at_level=(2, 3): write numbers above 0 that increase up to 4"),
         ((BITS, YES, YES, ()), "table has rows_at_level=(): write numbers above 0 that increase up to 4"),
+        ((BITS, YES, np.array([[True], [False], [True], [True]]), (2, 4)), "table has a row without an active output"),
     ],
 )
 def test_a_truth_table_whose_parts_do_not_belong_together_is_refused(table: Any, what: str) -> None:
@@ -300,10 +289,12 @@ def test_a_truth_table_whose_parts_do_not_belong_together_is_refused(table: Any,
 
 
 def test_what_fits_is_told_as_it_is() -> None:
-    progress = traced_progress(Walker(), TASK)
+    counts = {"n": jnp.int32(3), "b": jnp.array(True)}
+    progress = traced_progress(Stepping(give=lambda state, told: (state, replace(told, metrics=counts))), TASK)
     assert isinstance(progress, Progress)
+    metrics = {"n": ((), "int32"), "b": ((), "bool")}
     assert jax.tree.map(lambda leaf: (leaf.shape, str(leaf.dtype)), progress) == Progress(
-        fitness=((), "float32"), success=((), "float32"), healthy=((), "bool"), metrics={"first": ((), "float32")}
+        fitness=((), "float32"), success=((), "float32"), healthy=((), "bool"), metrics=metrics
     )
 
 
@@ -333,18 +324,6 @@ def test_a_task_whose_reset_does_not_read_the_level_is_refused_if_it_has_several
         traced_progress(Walker(), Deaf(3))
 
 
-@pytest.mark.parametrize(
-    ("parts", "sentence"),
-    [
-        ((BITS, YES, np.array([[True], [False], [True], [True]]), (2, 4)), "a row without an active output"),
-        ((BITS, YES, YES, (2, 3)), "that increase up to 4"),
-    ],
-)
-def test_a_table_with_rows_that_ask_nothing_or_are_never_asked_is_refused(parts: Any, sentence: str) -> None:
-    with pytest.raises(UserError, match=sentence):
-        TruthTable(*parts)
-
-
 @dataclass(frozen=True)
 class Misspelled(Walker):
     """Declares a package that there is none of."""
@@ -368,3 +347,64 @@ class Rounded(NParity):
 def test_a_success_that_is_1_but_for_rounding_is_a_sentence(tmp_path: Any, cpus: list[Any]) -> None:
     with pytest.raises(UserError, match=r"of 0\.9999999\d+, which is 1 except for rounding.*evoclaims\.envs\.averaged"):
         run(Condition(Walker(), Rounded(3), "direct", Budget(generations=1)), [0], Store(tmp_path), cpus)
+
+
+@pytest.mark.parametrize(
+    ("policy", "what"),
+    [
+        (Policy(jnp.zeros(1), None), "a Policy with None as its function, which cannot be called."),  # type: ignore[arg-type]
+        (Policy(1.5, lambda _, bits: bits[:1]), "a Policy with 1.5 among its parameters, which are arrays: jnp."),
+        (None, "None (without a `return`?), not Policy(parameters, function)."),
+        (jnp.zeros(1), "an array, not Policy(parameters, function)."),
+        ((jnp.zeros(1), jnp.tanh), "a tuple, not Policy(parameters, function)."),
+    ],
+    ids=["function", "float", "None", "array", "tuple"],
+)
+def test_a_policy_without_function_or_arrays_is_refused(policy: Any, what: str) -> None:
+    method = type("Odd", (Walker,), {"best": lambda self, task, state: policy})()
+    with pytest.raises(UserError) as caught:
+        traced_progress(method, TASK)
+    assert str(caught.value).startswith(f"{BOTH}'best' of 'walker' returns {what}")
+
+
+@pytest.mark.parametrize("action", [None, "yes", [[1.0], [1.0, 2.0]]])
+def test_an_action_that_is_no_array_is_refused_with_both_names(action: Any) -> None:
+    method = type("Odd", (Walker,), {"best": lambda self, task, state: Policy(state, lambda p, bits: action)})()
+    with pytest.raises(
+        UserError, match=BOTH + r"an action is .*, which is not an array, and 'n_parity' takes shape \(1,\)"
+    ):
+        traced_progress(method, TASK)
+
+
+@dataclass(frozen=True)
+class Playing(NParity):
+    """3-parity whose episode gives something else."""
+
+    give: Any = None
+
+    def episode(self, policy: Any, key: Any, level: Any) -> Any:
+        return self.give(super().episode(policy, key, level))
+
+
+@pytest.mark.parametrize(
+    ("give", "what"),
+    [
+        (lambda e: None, "None (without a `return`?), not an Episode."),
+        (lambda e: e.fitness, "an array, not an Episode."),
+        (lambda e: (e.fitness, e.success), "a tuple, not an Episode."),
+        (lambda e: replace(e, success=[e.success]), "a success of a list, which is not an array, not of shape () and"),
+    ],
+    ids=["None", "array", "tuple", "list"],
+)
+def test_an_episode_that_is_none_is_named_and_not_what_a_method_fails_at(give: Any, what: str) -> None:
+    with pytest.raises(UserError) as caught:
+        traced_progress(RandomSearch(2), Playing(3, give=give))
+    assert str(caught.value).startswith(
+        f"{BOTH.replace('walker', 'random_search')}an episode of 'n_parity' gives {what}"
+    )
+
+
+def test_an_error_of_the_methods_own_is_not_laid_at_the_episodes_door() -> None:
+    method = type("Odd", (Walker,), {"step": lambda *_: TASK.nothing})()
+    with pytest.raises(AttributeError, match="nothing"):
+        traced_progress(method, TASK)

@@ -3,19 +3,50 @@
 from __future__ import annotations
 
 import os
+import warnings
 import zlib
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import jax
 import pytest
-import temporary_folders
-from temporary_folders import ALIVE, temporary_folder
-from test_lanes import compilation_cache, tear
+from trial_toys import walk
 
 from evoclaims.trials import devices
 from evoclaims.trials.devices import sweep
+from evoclaims.trials.runner import run
+from evoclaims.trials.store import Store
 
-__all__ = ["compilation_cache"]  # a fixture
+
+@pytest.fixture(scope="module", autouse=True)
+def compiled_once() -> None:
+    """Nothing is kept here from other tests: what is compiled again is looked at."""
+
+
+@pytest.fixture
+def compilation_cache(tmp_path: Path) -> Iterator[Path]:
+    """A compilation cache of the test's own."""
+    from jax.experimental.compilation_cache import compilation_cache
+
+    options = {"jax_compilation_cache_dir": str(tmp_path / "xla"), "jax_persistent_cache_min_compile_time_secs": 0.0}
+    was = {name: getattr(jax.config, name) for name in options}
+    for name, value in options.items():
+        jax.config.update(name, value)
+    compilation_cache.reset_cache()
+    yield tmp_path / "xla"
+    for name, value in was.items():
+        jax.config.update(name, value)
+    compilation_cache.reset_cache()
+
+
+def tear(cache: Path) -> int:
+    """Cut every entry, as a kill can, since jax writes them in place; so does one process see what another writes."""
+    entries = list(cache.glob("*-cache"))
+    for entry in entries:
+        entry.write_bytes(entry.read_bytes()[:100])
+    jax.clear_caches()
+    return len(entries)
 
 
 def name(number: int) -> str:
@@ -82,23 +113,11 @@ def test_beyond_a_bound_what_was_used_longest_ago_goes(tmp_path: Path, monkeypat
     assert [path.exists() for path in made[4:]] == [False, False, False, True]
 
 
-def test_temporary_folders_of_killed_processes_go(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(temporary_folders.tempfile, "gettempdir", lambda: str(tmp_path))
-    monkeypatch.setattr(temporary_folders.tempfile, "mkdtemp", lambda prefix: str(_made(tmp_path / f"{prefix}new")))
-    monkeypatch.setattr(temporary_folders, "_held", [])
-    killed, young, foreign = (_made(tmp_path / f"evoclaims-{each}") for each in ("killed", "young", "foreign"))
-    for folder in (killed, young):
-        (folder / ALIVE).touch()
-    os.utime(killed / ALIVE, (1.0, 1.0))
-    living = temporary_folder()
-    assert not killed.exists()
-    assert young.exists()
-    assert foreign.exists()  # such as one of an earlier release, of which nobody knows whether it is used
-    os.utime(living / ALIVE, (1.0, 1.0))
-    temporary_folder("evoclaims-tests-")
-    assert living.exists()
-
-
-def _made(folder: Path) -> Path:
-    folder.mkdir()
-    return folder
+def test_a_torn_entry_of_the_compilation_cache_costs_time_and_nothing_else(
+    tmp_path: Path, cpus: list[Any], compilation_cache: Path
+) -> None:
+    condition = walk(steps=7)
+    wanted = run(condition, [0], Store(tmp_path / "one"), cpus)
+    assert tear(compilation_cache) >= 3
+    with warnings.catch_warnings(action="error"):
+        assert run(condition, [0], Store(tmp_path / "two"), cpus)[0].digest == wanted[0].digest

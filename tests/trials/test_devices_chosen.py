@@ -7,13 +7,18 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
+from trial_toys import walk
 
 from evoclaims.core import files
 from evoclaims.core.errors import UserError
 from evoclaims.trials import devices
 from evoclaims.trials.layout import Layout, layout_on
+from evoclaims.trials.runner import run
+from evoclaims.trials.store import Store
 
 
 def test_an_unknown_device_is_a_sentence_with_the_known_ones() -> None:
@@ -35,6 +40,18 @@ def test_a_gpu_that_is_not_there_is_a_sentence_with_the_remedy(monkeypatch: pyte
 def test_the_cpu_can_always_be_asked_for() -> None:
     assert {device.platform for device in devices.choose("cpu")} == {"cpu"}
     assert layout_on(devices.choose("cpu")[0].platform) is Layout.ALONE
+
+
+def test_heaps_are_shared_before_jax_makes_threads_and_memory_is_given_back_after_a_batch(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls: list[Any] = []
+    libc = SimpleNamespace(mallopt=lambda *which: calls.append(which), malloc_trim=lambda _: calls.append("trim"))
+    monkeypatch.setattr(devices, "_libc", lambda: libc)
+    devices.configure()
+    assert calls == [(-8, 2)]
+    run(walk(steps=2), [0], Store(tmp_path), devices.choose("cpu"))
+    assert calls[-1] == "trim"
 
 
 SCRIPT = """

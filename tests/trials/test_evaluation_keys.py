@@ -9,10 +9,8 @@ from typing import Any, ClassVar
 import jax
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from evoclaims.core.keys import EVALUATION, TRAINING, trial_key
+from evoclaims.core.keys import EVALUATION, trial_key
 from evoclaims.envs.base import Episode, PolicyFn, TaskState
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.ppo import Ppo
@@ -83,21 +81,3 @@ def test_no_key_of_the_evaluation_was_used_in_training(name: str) -> None:
     assert not training & evaluation
     root = jax.random.split(trial_key(5, EVALUATION), 2)
     assert evaluation == set(map(tuple, np.asarray(jax.random.key_data(root)).tolist()))
-
-
-@settings(max_examples=30, deadline=None)
-@given(st.integers(0, 2**31 - 1), st.integers(0, 2**31 - 1))
-def test_training_and_evaluation_grow_from_different_roots(seed: int, other: int) -> None:
-    training, evaluation = (
-        tuple(np.asarray(jax.random.key_data(trial_key(s, purpose))).tolist())
-        for s, purpose in ((seed, TRAINING), (other, EVALUATION))
-    )
-    assert training != evaluation
-
-
-def test_the_evaluation_of_a_seed_is_the_same_for_every_method_and_budget() -> None:
-    short = Condition(METHODS["random_search"], Watched(3), "curriculum", Budget(generations=1, reports=1))
-    long = Condition(RandomSearch(5, network=AllSkips(hidden=2)), Watched(3), "direct", Budget(generations=4))
-    judged = _keys(short, 7)[1]
-    assert judged == _keys(long, 7)[1]
-    assert not judged & _keys(short, 8)[1]

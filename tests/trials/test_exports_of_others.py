@@ -19,7 +19,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evoclaims.core.errors import UserError
+from evoclaims.trials import table_formats
 from evoclaims.trials.imported import Imported
+from evoclaims.trials.table_file import read_table
 from evoclaims.trials.table_formats import READERS
 
 pytestmark = pytest.mark.oldest
@@ -61,26 +63,39 @@ def test_json_of_pandas_is_read_in_every_layout_with_names(
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("ending", "text", "said"),
     [
-        (FRAME.to_json(orient="values"), r"row 1 is \[4,1.5,'a'\]|row 1 is \[4, 1.5, 'a'\]"),
-        (FRAME.set_index("note").to_json(), "which may be its columns or its rows: write it by to_json"),
-        (FRAME.T.to_json(orient="split").replace("7,", ""), "not all of its rows have 3 cells, as many as its columns"),
-        ('{"seed": [1, 2], "return": [3]}', r"its columns have different lengths \(1, 2\)"),
-        ('{"seed": {"0": 1, "0": 2}, "return": {"0": 3, "0": 4}}', "two of its rows have one label"),
-        ('{"seed": 1, "return": 2}\n# the end', "its line 2 is '# the end'"),
-        ('"runs"', "and this is 'runs'"),
+        ("json", FRAME.to_json(orient="values"), r"row 1 is \[4,1.5,'a'\]|row 1 is \[4, 1.5, 'a'\]"),
+        ("json", FRAME.set_index("note").to_json(), "which may be its columns or its rows: write it by to_json"),
+        ("json", FRAME.T.to_json(orient="split").replace("7,", ""), "not all of its rows have 3 cells, as many as its"),
+        ("json", '{"seed": [1, 2], "return": [3]}', r"its columns have different lengths \(1, 2\)"),
+        ("json", '{"seed": {"0": 1, "0": 2}, "return": {"0": 3, "0": 4}}', "two of its rows have one label"),
+        ("json", '{"seed": 1, "return": 2}\n# the end', "its line 2 is '# the end'"),
+        ("json", '"runs"', "and this is 'runs'"),
+        ("json", "[1, 2]", "a table in JSON is a list of objects, .*, and row 1 is 1"),
+        ("json", "{", "a table in JSON is a list of objects, .*, and its line 1 is '{'"),
+        ("json", '[{"seed": 1, "seed": 2, "return": 3}]', r"two of its columns have one name \(seed, return, seed"),
+        ("jsonl", '{"seed": 1, "return": 3, "return": 4}', r"two of its columns have one name \(seed, return, ret"),
+        ("parquet", "PAR", "it is not a Parquet file"),
+        ("csv", "", "it has no first line with the columns' names"),
+        ("csv", "seed,return\n1\n", r"row 1 has 1 cells \('1'\), and its first line names 2 columns \('seed,return'\)"),
+        ("csv", "seed,seed\n1,2\n", r"two of its columns have one name \(seed, seed\)"),
+        ("csv", FRAME.to_csv(index=False, sep=";"), "its first line has no ',' between names, but ';': 'seed"),
+        ("csv", FRAME.to_csv(index=False, sep="\t"), r"its first line has no ',' between names, but .*: 'seed"),
+        ("csv", 'seed,return,note\n4,1,a\n7,2,"b\n9,3,c\n', "a cell begins with a quote that does not end"),
+        ("csv", FRAME.to_csv(index=False).encode("utf-16"), "it is UTF-16 text: save it as UTF-8"),
     ],
 )
-def test_json_without_names_or_with_doubt_is_refused(values: Callable[..., list[float]], text: str, said: str) -> None:
-    with pytest.raises(UserError, match=rf"runs\.json is not a table that can be read: .*({said})"):
-        values(text, "runs.json")
+def test_a_file_without_names_or_with_doubt_is_refused(
+    values: Callable[..., list[float]], ending: str, text: str | bytes, said: str
+) -> None:
+    with pytest.raises(UserError, match=rf"runs\.{ending} is not a table that can be read: .*({said})"):
+        values(text, f"runs.{ending}")
 
 
-def test_json_of_a_frame_without_columns_is_a_table_without_columns(values: Callable[..., list[float]]) -> None:
-    for layout in ("split", "columns", "index"):
-        with pytest.raises(UserError, match="runs.json is a table without columns"):
-            values(pd.DataFrame().to_json(orient=layout), "runs.json")
+def test_a_frame_without_columns_is_a_table_without_columns(values: Callable[..., list[float]]) -> None:
+    with pytest.raises(UserError, match="runs.json is a table without columns"):
+        values(pd.DataFrame().to_json(orient="split"), "runs.json")
 
 
 MONITOR = '#{"t_start": 1690000000.5, "env_id": "CartPole-v1"}\n'
@@ -95,11 +110,6 @@ def test_lines_before_the_names_are_passed_over(values: Callable[..., list[float
     assert values(before + TABLE.replace(",", "\t"), "runs.tsv") == VALUES
 
 
-def test_monitor_file_is_read(values: Callable[..., list[float]]) -> None:
-    text = MONITOR + "r,l,t\n9.0,9,0.1\n12.0,12,0.3\n"
-    assert values(text, seed="l", metric={"return": "r"}) == [9.0, 12.0]
-
-
 def test_names_behind_a_number_sign_are_names(values: Callable[..., list[float]]) -> None:
     file = io.StringIO()
     np.savetxt(file, FRAME[["seed", "return"]].to_numpy(), delimiter=",", header="seed,return")
@@ -107,22 +117,6 @@ def test_names_behind_a_number_sign_are_names(values: Callable[..., list[float]]
     assert values(file.getvalue(), seed="# seed") == VALUES
     with pytest.raises(UserError, match="named 'seed'. Did you mean '# seed'"):
         values(file.getvalue())
-
-
-@pytest.mark.parametrize("delimiter", [";", "|", "\t"])
-def test_other_delimiters_are_named(values: Callable[..., list[float]], delimiter: str) -> None:
-    with pytest.raises(UserError, match="its first line has no ',' between names, but .*: 'seed"):
-        values(FRAME.to_csv(index=False, sep=delimiter))
-
-
-def test_quote_that_is_never_closed_swallows_no_rows(values: Callable[..., list[float]]) -> None:
-    with pytest.raises(UserError, match="a cell begins with a quote that does not end"):
-        values('seed,return,note\n4,1,a\n7,2,"b\n9,3,c\n')
-
-
-def test_text_in_another_encoding_is_named(values: Callable[..., list[float]]) -> None:
-    with pytest.raises(UserError, match="it is UTF-16 text: save it as UTF-8"):
-        values(TABLE.encode("utf-16"))
 
 
 ODD = {
@@ -177,3 +171,35 @@ def test_every_table_that_python_writes_is_read_as_written(rows: list[tuple[str,
     csv.writer(file, delimiter=delimiter, quoting=csv.QUOTE_ALL).writerows([("a", "b"), *rows])
     columns = READERS[".csv" if delimiter == "," else ".tsv"](file.getvalue().encode("utf-8", "surrogatepass"))
     assert list(zip(columns.cells("a"), columns.cells("b"), strict=True)) == rows
+
+
+def test_texts_that_repeat_in_parquet_are_held_once(tmp_path: Path) -> None:
+    path = tmp_path / "t.parquet"
+    pyarrow.parquet.write_table(pyarrow.table({"text": ["x" * 1_000] * 50_000}), path, compression="zstd")
+    cells = read_table(path).columns.cells("text")
+    assert len(cells) == 50_000
+    assert len(set(map(id, cells))) <= 10
+
+
+def test_a_parquet_file_of_too_many_rows_is_a_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(table_formats, "MOST_ROWS", 10)
+    pyarrow.parquet.write_table(pyarrow.table({"seed": [1] * 11}), tmp_path / "t.parquet")
+    with pytest.raises(UserError, match="it has 11 rows, and at most 10 are read"):
+        read_table(tmp_path / "t.parquet")
+
+
+@pytest.mark.parametrize("suffix", ["csv", "jsonl", "parquet"])
+@pytest.mark.parametrize("cell", [2**53 + 1, 2**64 - 1, -(2**53) - 1, 2**53, 2**60, 3])
+def test_whole_numbers_that_no_float_holds_are_refused(cell: int, suffix: str, tmp_path: Path) -> None:
+    path = tmp_path / f"t.{suffix}"
+    if suffix == "parquet":
+        kind = pyarrow.uint64() if cell > 0 else pyarrow.int64()
+        pyarrow.parquet.write_table(pyarrow.table({"seed": [1], "score": pyarrow.array([cell], kind)}), path)
+    else:
+        path.write_text(f"seed,score\n1,{cell}\n" if suffix == "csv" else f'{{"seed": 1, "score": {cell}}}\n')
+    trials = Imported(path, "seed", "score")
+    if float(cell) == cell:
+        assert trials.existing[0].metrics["score"] == cell
+        return
+    with pytest.raises(UserError, match=f"holds {cell} in row 1 of the column 'score', a whole number beyond 2.53"):
+        _ = trials.existing

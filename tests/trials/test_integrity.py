@@ -48,14 +48,6 @@ def age(path: Path, seconds: float = 3600.0) -> None:
     os.utime(path, (then, then))
 
 
-def kinds(problems: list[Problem]) -> list[tuple[str, str]]:
-    return [(problem.kind, problem.path.suffix) for problem in problems]
-
-
-def test_a_sound_store_has_no_problems(store: Store, trial: TrialResult) -> None:
-    assert verify(store, repair=True) == []
-
-
 @pytest.mark.parametrize("field", ["metrics", "levels", "curves", "status"])
 def test_an_edited_record_is_found_by_its_digest(
     field: str, store: Store, trial: TrialResult, edit_record: Any
@@ -84,24 +76,8 @@ def test_a_trial_without_an_outcome_has_the_digest_of_its_reason(
     assert verify(store, repair=False) == []
 
 
-def test_a_store_that_does_not_exist_yet_has_no_problems(store: Store) -> None:
-    assert verify(store, repair=True) == []
-    assert not store.root.exists()
-
-
-@pytest.mark.parametrize("damage", [cut_the_record, edit_the_record, cut_the_champion])
-def test_damage_lists_record_and_champion(
-    store: Store, trial: TrialResult, damage: Callable[[Store, TrialResult], None]
-) -> None:
-    damage(store, trial)
-    problems = verify(store, repair=False)
-    assert [problem.path for problem in problems] == [store.record_path(trial.id), store.champion_path(trial.id)]
-    assert kinds(problems) == [("record", ".json"), ("champion", ".npz")]
-    assert all(problem.moved_to is None for problem in problems)
-
-
 @pytest.mark.parametrize("damage", [cut_the_record, edit_the_record, cut_the_champion, lose_the_champion])
-def test_a_repair_lets_the_trial_be_run_again_and_deletes_nothing(
+def test_damage_is_listed_and_a_repair_lets_the_trial_be_run_again_and_deletes_nothing(
     store: Store,
     trial: TrialResult,
     make_result: Make,
@@ -112,6 +88,9 @@ def test_a_repair_lets_the_trial_be_run_again_and_deletes_nothing(
     store.put(sound, parameters)
     damage(store, trial)
     contents = {path.read_bytes() for path in store.root.rglob("*") if path.is_file()}
+    listed = verify(store, repair=False)
+    both = [("record", store.record_path(trial.id), None), ("champion", store.champion_path(trial.id), None)]
+    assert [(one.kind, one.path, one.moved_to) for one in listed] == both[: 1 + (damage is not lose_the_champion)]
     for problem in verify(store, repair=True):
         assert problem.moved_to is not None
         assert problem.moved_to.parent == store.root / "quarantine"
@@ -145,50 +124,35 @@ def test_foreign_files_are_listed_wherever_they_lie(store: Store, trial: TrialRe
     misplaced = store.root / "trials" / "zz" / record.name
     misplaced.parent.mkdir()
     misplaced.write_bytes(record.read_bytes())
+    wrong = record.parent.with_name("00" if record.parent.name != "00" else "01") / record.name
+    wrong.parent.mkdir()
+    wrong.write_bytes(record.read_bytes())
     problems = verify(store, repair=True)
-    assert {problem.path for problem in problems} == {*strays, misplaced.parent}
+    assert {problem.path for problem in problems} == {*strays, misplaced.parent, wrong}
     assert verify(store, repair=False) == []
     assert store.ids() == (trial.id,)
 
 
-def test_a_record_in_the_wrong_folder_is_listed(store: Store, trial: TrialResult) -> None:
-    record = store.record_path(trial.id)
-    wrong = record.parent.with_name("00" if record.parent.name != "00" else "01") / record.name
-    wrong.parent.mkdir()
-    wrong.write_bytes(record.read_bytes())
-    assert [problem.path for problem in verify(store, repair=False)] == [wrong]
-
-
-def test_half_written_files_of_a_kill_are_listed_once_nobody_can_be_writing_them(
-    store: Store, trial: TrialResult
-) -> None:
-    path = store.record_path(trial.id)
-    aside = path.with_name(f".{path.name}.123.abcd.tmp")
+def test_what_a_kill_has_left_is_listed_once_nobody_can_be_at_it(store: Store, trial: TrialResult) -> None:
+    """A half-written record, a champion whose record was never written, and a notice that nobody refreshes."""
+    record, champion = store.record_path(trial.id), store.champion_path(trial.id)
+    aside = record.with_name(f".{record.name}.123.abcd.tmp")
     aside.write_bytes(b'{"sch')
-    assert verify(store, repair=True) == []
-    age(aside)
-    assert kinds(verify(store, repair=True)) == [("leftover", ".tmp")]
+    record.unlink()
+    with announced(store.root, trial.condition):
+        left = {aside, champion, lease_path(store.root, trial.condition)}
+        assert verify(store, repair=True) == []
+        for path in left:
+            age(path)
+        assert {(problem.kind, problem.path) for problem in verify(store, repair=True)} == {
+            ("leftover", path) for path in left
+        }
     assert verify(store, repair=False) == []
 
 
-def test_a_champion_whose_record_was_never_written_is_a_leftover_once_settled(store: Store, trial: TrialResult) -> None:
-    store.record_path(trial.id).unlink()
-    assert verify(store, repair=True) == []
-    age(store.champion_path(trial.id))
-    assert kinds(verify(store, repair=True)) == [("leftover", ".npz")]
-
-
-def test_the_notice_of_a_process_that_is_gone_is_a_leftover_and_that_of_a_live_one_is_not(
-    store: Store, trial: TrialResult
-) -> None:
-    with announced(store.root, trial.condition):
-        path = lease_path(store.root, trial.condition)
-        assert verify(store, repair=True) == []
-        age(path)
-        assert [problem.path for problem in verify(store, repair=False)] == [path]
-
-
 def test_a_checkpoint_is_judged_by_whoever_knows_its_schema(store: Store) -> None:
+    assert verify(store, repair=True) == []  # there is no such store yet
+    assert not store.root.exists()
     store.check_writable()
     store.checkpoints.mkdir(parents=True)
     good, bad = store.checkpoints / "good.ckpt", store.checkpoints / "bad.ckpt"

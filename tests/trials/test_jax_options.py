@@ -23,6 +23,11 @@ from evoclaims.trials.spec import Budget, Condition
 from evoclaims.trials.store import Store
 
 
+@pytest.fixture(scope="module", autouse=True)
+def compiled_once() -> None:
+    """Nothing is kept here from other tests: options may change what is compiled."""
+
+
 def _others(name: str) -> list[Any]:
     """Return the values that an option has not, of a boolean or an enumeration."""
     kind, arguments, settings = jax.config.meta[name]

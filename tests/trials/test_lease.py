@@ -8,7 +8,6 @@ import signal
 import socket
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -19,10 +18,9 @@ import pytest
 
 from evoclaims.claims.fetching import RunMissing
 from evoclaims.core.errors import UserError
-from evoclaims.report.live_line import describe
 from evoclaims.trials import lease as leases
 from evoclaims.trials.lease import announced, lease_path, sweep
-from evoclaims.trials.progress import RunProgress, ignore
+from evoclaims.trials.progress import ignore
 from evoclaims.trials.store import Store
 
 pytestmark = pytest.mark.oldest
@@ -94,24 +92,19 @@ def never(seconds: float) -> None:
     pytest.fail("waited")
 
 
-def test_a_notice_says_who_runs_the_condition_and_goes_with_the_block(tmp_path: Path) -> None:
-    with announced(tmp_path, CONDITION, sleep=never):
-        owner = filelock.SoftFileLease(lease_path(tmp_path, CONDITION)).owner
-        assert owner is not None
-        assert (owner.pid, owner.hostname.partition("?")[0]) == (os.getpid(), socket.gethostname())
+def test_a_notice_says_who_runs_the_condition_and_goes_with_the_block_also_when_that_fails(tmp_path: Path) -> None:
+    def fails() -> None:
+        with announced(tmp_path, CONDITION, sleep=never):
+            owner = filelock.SoftFileLease(lease_path(tmp_path, CONDITION)).owner
+            assert owner is not None
+            assert (owner.pid, owner.hostname.partition("?")[0]) == (os.getpid(), socket.gethostname())
+            assert waits(tmp_path, sleep=never) == []  # nobody waits for its own process
+            assert lease_path(tmp_path, CONDITION).exists()
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        fails()
     assert list((tmp_path / "running").iterdir()) == []
-
-
-def test_a_notice_goes_when_the_block_fails(tmp_path: Path) -> None:
-    with pytest.raises(ZeroDivisionError), announced(tmp_path, CONDITION):
-        raise ZeroDivisionError
-    assert list((tmp_path / "running").iterdir()) == []
-
-
-def test_nobody_waits_for_its_own_process(tmp_path: Path) -> None:
-    with announced(tmp_path, CONDITION):
-        assert waits(tmp_path, sleep=never) == []
-        assert lease_path(tmp_path, CONDITION).exists()
 
 
 def test_a_process_waits_for_another_that_lives_and_says_for_whom(
@@ -149,16 +142,6 @@ def test_processes_that_start_together_agree_on_one(tmp_path: Path) -> None:
     for process in processes:
         process.communicate("done\n")
     assert sorted(said) == ["runs", "waits", "waits"]
-
-
-@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="only Linux tells when a process started")
-def test_a_later_process_with_the_same_number_keeps_nobody_waiting(
-    tmp_path: Path, runner: subprocess.Popen[str]
-) -> None:
-    path = lease_path(tmp_path, CONDITION)
-    before, _, born = path.read_text().rstrip().rpartition("start=")
-    path.write_text(f"{before}start={int(born) - 1}\n")
-    assert waits(tmp_path, sleep=never) == []
 
 
 @pytest.mark.parametrize("wrong", [-3600.0, 3600.0])  # an hour, by which the other host's clock is wrong
@@ -216,7 +199,7 @@ def test_a_stopped_process_keeps_others_waiting_no_longer_than_one_elsewhere(
     runner.send_signal(signal.SIGCONT)
 
 
-def test_a_notice_is_refreshed_through_a_chunk_of_any_length(tmp_path: Path, hasty: None) -> None:
+def test_a_notice_is_refreshed_until_another_process_has_taken_it_over(tmp_path: Path, hasty: None) -> None:
     """Nobody calls anything here: while XLA computes, the process does nothing else."""
     path = lease_path(tmp_path, CONDITION)
     with announced(tmp_path, CONDITION):
@@ -225,12 +208,6 @@ def test_a_notice_is_refreshed_through_a_chunk_of_any_length(tmp_path: Path, has
         while path.stat().st_mtime == 1.0:
             assert time.monotonic() < end
             time.sleep(0.01)
-    assert not [thread for thread in threading.enumerate() if "lease" in thread.name]
-
-
-def test_a_process_that_was_taken_over_from_leaves_the_others_notice_alone(tmp_path: Path, hasty: None) -> None:
-    with announced(tmp_path, CONDITION):
-        path = lease_path(tmp_path, CONDITION)
         path.unlink()
         forge(tmp_path)
         os.utime(path, (1.0, 1.0))
@@ -239,17 +216,13 @@ def test_a_process_that_was_taken_over_from_leaves_the_others_notice_alone(tmp_p
     assert path.exists()
 
 
-@pytest.mark.parametrize("text", ["", "{", '{"pid": 1}', "[" * 100_000, "\x00\xff", "filelock/2\npid=-1\n"])
+@pytest.mark.parametrize("text", ["", '{"pid": 1}', "\x00\xff", "filelock/2\npid=-1\n"])
 def test_a_text_that_is_no_notice_is_stale(tmp_path: Path, hasty: None, text: str) -> None:
     forge(tmp_path).write_text(text)
     assert set(waits(tmp_path)) == {"waiting for another process, which runs the same condition"}
 
 
-@pytest.mark.parametrize(
-    "make",
-    [Path.mkdir, os.mkfifo, lambda path: path.symlink_to("nowhere"), lambda path: path.symlink_to(path)],
-    ids=["folder", "pipe", "to nowhere", "circular"],
-)
+@pytest.mark.parametrize("make", [Path.mkdir, os.mkfifo, lambda path: path.symlink_to(path)])
 def test_an_odd_file_where_a_notice_belongs_keeps_nobody_waiting_for_ever(
     tmp_path: Path, hasty: None, make: Callable[[Path], None]
 ) -> None:
@@ -277,13 +250,6 @@ def test_a_text_that_is_no_condition_reaches_no_file(tmp_path: Path) -> None:
         pass
 
 
-def test_control_characters_of_a_notice_never_reach_the_terminal(tmp_path: Path) -> None:
-    path = forge(tmp_path, host="\x1b[31mhost")
-    (said,) = waits(tmp_path, sleep=lambda seconds: path.unlink())
-    assert "\x1b" in said
-    assert describe(RunProgress("neat on parity", said, 10)).isprintable()
-
-
 def test_notices_of_processes_that_are_gone_are_swept_and_the_others_stay(
     tmp_path: Path, runner: subprocess.Popen[str]
 ) -> None:
@@ -294,33 +260,25 @@ def test_notices_of_processes_that_are_gone_are_swept_and_the_others_stay(
     assert {path.name for path in (tmp_path / "running").iterdir()} == {elsewhere.name, f"{CONDITION}.lock"}
 
 
-@pytest.mark.parametrize("done", ["a condition ends", "there is nothing to run"])
-def test_who_ends_a_condition_or_has_nothing_to_run_sweeps_too(tmp_path: Path, done: str) -> None:
+def test_who_ends_a_condition_or_has_nothing_to_run_sweeps_too(tmp_path: Path) -> None:
     Store(tmp_path).check_writable()
-    gone = forge(tmp_path, OTHER, pid=GONE, host=filelock_host(tmp_path))
-    if done == "a condition ends":
-        waits(tmp_path)
-    else:
-        RunMissing(Store(tmp_path), "cpu", ignore).check()
-    assert not gone.exists()
-
-
-@pytest.mark.skipif(not Path("/proc/self/ns/pid").exists(), reason="only Linux numbers processes anew in containers")
-def test_a_process_of_another_container_is_not_taken_for_one_that_has_ended(tmp_path: Path) -> None:
-    path = forge(tmp_path, OTHER, pid=GONE, host=f"{socket.gethostname()}?pidns-1")
-    sweep(tmp_path)
-    assert path.exists()
+    for sweeps in (lambda: waits(tmp_path), RunMissing(Store(tmp_path), "cpu", ignore).check):
+        gone = forge(tmp_path, OTHER, pid=GONE, host=filelock_host(tmp_path))
+        sweeps()
+        assert not gone.exists()
 
 
 @pytest.mark.skipif(not Path("/proc/self/ns/pid").exists(), reason="only Linux numbers processes anew in containers")
 @pytest.mark.parametrize("inside", [True, False])
-def test_a_container_with_the_hosts_name_breaks_no_notice_of_the_host(
+def test_a_container_with_the_hosts_name_breaks_no_notice_of_the_host_or_of_another_container(
     inside: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = forge(tmp_path, OTHER, pid=GONE, host=socket.gethostname())  # as filelock writes it on the host itself
+    other = forge(tmp_path, CONDITION, pid=GONE, host=f"{socket.gethostname()}?pidns-1")
     monkeypatch.setattr(leases, "_INITIAL", 1 if inside else os.stat("/proc/self/ns/pid").st_ino)
     sweep(tmp_path)
     assert path.exists() is inside
+    assert other.exists()
 
 
 @pytest.mark.skipif(not Path("/proc/self/ns/pid").exists(), reason="only Linux tells which processes there are")
@@ -339,8 +297,7 @@ def test_a_folder_that_cannot_be_swept_stops_nothing(tmp_path: Path, monkeypatch
     def refuse(path: Path) -> None:
         raise OSError(errno.EROFS, "Read-only file system")
 
-    gone = forge(tmp_path, OTHER, pid=GONE, host=filelock_host(tmp_path))
+    forge(tmp_path, OTHER, pid=GONE, host=filelock_host(tmp_path))
     monkeypatch.setattr(Path, "unlink", refuse)
     sweep(tmp_path)
-    assert gone.exists()
     sweep(tmp_path / "none")

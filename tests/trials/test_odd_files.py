@@ -44,10 +44,6 @@ def impatient() -> Iterator[None]:
     signal.signal(signal.SIGALRM, before)
 
 
-def as_pipe(path: Path) -> None:
-    os.mkfifo(path)
-
-
 def as_folder(path: Path) -> None:
     path.mkdir()
 
@@ -60,65 +56,6 @@ def as_link_to_nowhere(path: Path) -> None:
     path.symlink_to("nowhere")
 
 
-ODD: list[Callable[[Path], None]] = [as_pipe, as_folder, as_circle]
-
-
-@pytest.mark.parametrize("make", ODD)
-def test_an_odd_record_is_a_damaged_file_that_verify_moves_aside(
-    store: Store, trial: TrialResult, make: Callable[[Path], None]
-) -> None:
-    path = store.record_path(trial.id)
-    path.unlink()
-    make(path)
-    with pytest.raises(DamagedFileError, match="it cannot be read"):
-        store.get(trial.id)
-    assert path in {problem.path for problem in verify(store, repair=True)}
-    assert store.get(trial.id) is None
-
-
-@pytest.mark.parametrize("make", [*ODD, as_link_to_nowhere])
-def test_an_odd_champion_is_a_damaged_file_that_verify_moves_aside(
-    store: Store, trial: TrialResult, make: Callable[[Path], None]
-) -> None:
-    path = store.champion_path(trial.id)
-    path.unlink()
-    make(path)
-    with pytest.raises(DamagedFileError, match="it cannot be read"):
-        store.champion_of(store.get(trial.id))
-    assert store.record_path(trial.id) in {problem.path for problem in verify(store, repair=True)}
-
-
-@pytest.mark.parametrize("make", ODD)
-def test_an_odd_checkpoint_is_a_damaged_file(store: Store, make: Callable[[Path], None]) -> None:
-    path = store.checkpoints / f"{'a' * 64}-{'b' * 16}.npz"
-    path.parent.mkdir(parents=True)
-    make(path)
-    with pytest.raises(DamagedFileError, match="not a (file|readable checkpoint)"):
-        checkpoint.find(store.checkpoints, "a" * 64, "platform")
-
-
-def test_a_checkpoint_that_leads_nowhere_is_gone(store: Store) -> None:
-    path = store.checkpoints / f"{'a' * 64}-{'b' * 16}.npz"
-    path.parent.mkdir(parents=True)
-    as_link_to_nowhere(path)
-    assert not list(checkpoint.find(store.checkpoints, "a" * 64, "platform"))
-
-
-@pytest.mark.parametrize("make", [*ODD, as_link_to_nowhere])
-def test_an_odd_file_of_reference_trials_is_a_sentence(tmp_path: Path, make: Callable[[Path], None]) -> None:
-    path = tmp_path / "better-small.jsonl"
-    make(path)
-    with pytest.raises(UserError, match=r"The reference trials .*better-small\.jsonl .*Restore the file"):
-        references.load(path)
-
-
-@pytest.mark.parametrize("make", ODD)
-def test_an_odd_file_of_accepted_verdicts_is_a_sentence(tmp_path: Path, make: Callable[[Path], None]) -> None:
-    make(tmp_path / history.FILE)
-    with pytest.raises(UserError, match="Cannot read"):
-        history.load(tmp_path / history.FILE)
-
-
 def as_endless_device(path: Path) -> None:
     path.symlink_to("/dev/zero")
 
@@ -127,43 +64,79 @@ def as_brackets(path: Path) -> None:
     path.write_text("[" * 200_000 + "]" * 200_000)
 
 
-@pytest.mark.parametrize("make", [*ODD, as_link_to_nowhere, as_endless_device, as_brackets])
-def test_an_odd_file_of_evidence_is_replaced(tmp_path: Path, make: Callable[[Path], None]) -> None:
-    report = ClaimReport("A", "", "smoke", "it is", "§1", Outcome.SUPPORTED, "so it is")
-    path = evidence_path(report, tmp_path)
-    path.parent.mkdir(parents=True)
+ODD: list[Callable[[Path], None]] = [os.mkfifo, as_folder, as_circle, as_endless_device]
+LONG = "a" * 64
+
+
+@pytest.mark.parametrize("make", ODD)
+def test_an_odd_file_of_a_store_is_a_damaged_file_that_verify_moves_aside(
+    store: Store, trial: TrialResult, make: Callable[[Path], None]
+) -> None:
+    champion, record = store.champion_path(trial.id), store.record_path(trial.id)
+    champion.unlink()
+    make(champion)
+    with pytest.raises(DamagedFileError, match="it cannot be read"):
+        store.champion_of(trial_in(store, trial))
+    assert record in {problem.path for problem in verify(store, repair=False)}
+    record.unlink()
+    make(record)
+    with pytest.raises(DamagedFileError, match="it cannot be read"):
+        store.get(trial.id)
+    assert record in {problem.path for problem in verify(store, repair=True)}
+    assert store.get(trial.id) is None
+    store.checkpoints.mkdir(parents=True)
+    make(store.checkpoints / f"{LONG}-{'b' * 16}.npz")
+    with pytest.raises(DamagedFileError, match="not a (file|readable checkpoint)"):
+        checkpoint.find(store.checkpoints, LONG, "platform")
+
+
+def trial_in(store: Store, trial: TrialResult) -> TrialResult:
+    """Return a trial as it is stored."""
+    found = store.get(trial.id)
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize("make", [*ODD, as_link_to_nowhere, as_brackets])
+def test_an_odd_file_of_a_project_is_a_sentence_and_one_of_evidence_is_replaced(
+    tmp_path: Path, make: Callable[[Path], None]
+) -> None:
+    path = tmp_path / "better-small.jsonl"
     make(path)
+    with pytest.raises(UserError, match=r"better-small\.jsonl .*Restore the file"):
+        references.load(path)
+    if make not in (as_link_to_nowhere, as_brackets):  # no file, and a text
+        make(tmp_path / "pyproject.toml")
+        for load in (load_published, history.load):
+            with pytest.raises(UserError, match="Cannot read"):
+                load(tmp_path / "pyproject.toml")
+        with pytest.raises(UserError, match="Cannot read"):
+            load_config(tmp_path)
+        assert last_words(tmp_path / "pyproject.toml") == ""  # of a job's log
+    report = ClaimReport("A", "", "smoke", "it is", "§1", Outcome.SUPPORTED, "so it is")
+    evidence = evidence_path(report, tmp_path)
+    evidence.parent.mkdir(parents=True)
+    make(evidence)
     saved = save(report, tmp_path)
     assert bool(saved.unsaved) == (make is as_folder)
-    if make is not as_folder:
-        assert ClaimReport.from_json(json.loads(path.read_text())) == saved
+    assert make is as_folder or ClaimReport.from_json(json.loads(evidence.read_text())) == saved
 
 
-@pytest.mark.parametrize("make", [*ODD, as_link_to_nowhere, as_endless_device])
-def test_an_odd_log_of_a_job_has_no_last_words(tmp_path: Path, make: Callable[[Path], None]) -> None:
-    make(tmp_path / "1_0_log.out")
+def test_what_leads_nowhere_or_has_no_name_that_a_file_can_have_is_not_there(store: Store, tmp_path: Path) -> None:
+    store.checkpoints.mkdir(parents=True)
+    as_link_to_nowhere(store.checkpoints / f"{LONG}-{'b' * 16}.npz")
+    assert not list(checkpoint.find(store.checkpoints, LONG, "platform"))
+    assert references.load(references.path_of(tmp_path, "smoke", "m" * 300, "task")) == ()
+    as_link_to_nowhere(tmp_path / "1_0_log.out")
     assert last_words(tmp_path / "1_0_log.out") == ""
 
 
-@pytest.mark.parametrize("make", [*ODD, as_endless_device])
-def test_odd_files_of_settings_and_numbers_are_a_sentence(tmp_path: Path, make: Callable[[Path], None]) -> None:
-    make(tmp_path / "pyproject.toml")
-    with pytest.raises(UserError, match="Cannot read"):
-        load_config(tmp_path)
-    with pytest.raises(UserError, match="Cannot read"):
-        load_published(tmp_path / "pyproject.toml")
-
-
 def test_a_pipe_where_progress_is_shared_keeps_nobody_waiting(tmp_path: Path) -> None:
-    path = progress_path(tmp_path, "a" * 64)
+    path = progress_path(tmp_path, LONG)
     path.parent.mkdir(parents=True)
-    as_pipe(path)
-    with shared(tmp_path, "a" * 64, ignore) as tell:
+    os.mkfifo(path)
+    with shared(tmp_path, LONG, ignore) as tell:
         tell(RunProgress("a on b", "training", 1))
-
-
-def test_reference_trials_of_a_name_that_no_file_can_have_are_not_there(tmp_path: Path) -> None:
-    assert references.load(references.path_of(tmp_path, "smoke", "m" * 300, "task")) == ()
 
 
 def test_a_link_to_a_file_is_read(tmp_path: Path) -> None:

@@ -12,7 +12,6 @@ import pytest
 from trial_toys import Walker, walk
 
 from evoclaims.methods.base import Progress
-from evoclaims.trials.lanes import Lanes
 from evoclaims.trials.layout import Layout
 from evoclaims.trials.runner import run
 from evoclaims.trials.store import Store
@@ -39,14 +38,6 @@ def layout(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> A
     """How trials are laid out, on a CPU and on accelerators."""
     monkeypatch.setattr("evoclaims.trials.lanes.layout_on", lambda platform: request.param)
     return request.param
-
-
-def test_every_program_is_compiled_for_one_device(layout: Layout, cpus: list[Any]) -> None:
-    programs = Lanes(walk(), cpus).programs(4)
-    assert len(programs) == (4 if layout.alone else 2)
-    for program in {id(one): one for one in programs}.values():
-        for compiled in (program.advance, program.examine):
-            assert "num_partitions" not in compiled.as_text().splitlines()[0]  # type: ignore[attr-defined]
 
 
 def test_a_step_may_close_over_an_array_without_elements(layout: Layout, cpus: list[Any], tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -75,14 +76,11 @@ def test_no_flipped_byte_changes_what_a_record_says(make_result: Make, data: st.
     assert dump(back) == dump(result)
 
 
-@given(st.recursive(st.none() | st.booleans() | st.floats() | st.text(max_size=5), st.lists, max_leaves=5) | st.text())
-def test_any_other_json_is_refused_and_crashes_nothing(value: Any) -> None:
-    with pytest.raises(RecordError):
-        parse(json.dumps(value))
+plain = st.recursive(st.none() | st.booleans() | st.floats() | st.text(max_size=5), st.lists, max_leaves=5) | st.text()
 
 
-@given(st.binary(max_size=60))
-def test_any_other_bytes_are_refused_and_crash_nothing(data: bytes) -> None:
+@given(plain.map(json.dumps) | st.binary(max_size=60))
+def test_any_other_json_or_bytes_are_refused_and_crash_nothing(data: str | bytes) -> None:
     with pytest.raises(RecordError):
         parse(data)
 
@@ -95,29 +93,23 @@ def test_a_deeply_nested_text_is_refused_and_crashes_nothing(make_result: Make, 
             parse(text)
 
 
-def test_a_truncated_file_is_named_with_the_way_out(store: Store, trial: TrialResult) -> None:
+@pytest.mark.parametrize(
+    ("edit", "said"),
+    [
+        (lambda text: text[:100], "not one whole JSON text"),
+        (lambda text: text.replace('"status":', '"status":"crashed","status":'), "not one whole JSON text"),
+        (lambda text: text.replace("0.75", "0.76"), "seal"),
+        (lambda text: text.replace('"mean_success":0.75', '"mean_success":1e999'), "a number in it is too large"),
+        (lambda text: re.sub(',"timing":{[^}]*}', "", text), "missing or unknown: timing"),
+    ],
+    ids=["truncated", "a key named twice", "a metric", "an infinity", "a field too few"],
+)
+def test_an_edited_text_is_named_with_the_way_out(
+    store: Store, trial: TrialResult, edit: Callable[[str], str], said: str
+) -> None:
     path = store.record_path(trial.id)
-    path.write_bytes(path.read_bytes()[:100])
-    assert "not one whole JSON text" in complaint(store, trial.id)
-
-
-def test_a_metric_edited_by_hand_breaks_the_seal(store: Store, trial: TrialResult, edit_record: Edit) -> None:
-    edit_record(store.record_path(trial.id), reseal=False, metrics={"mean_success": 1.0})
-    assert "seal" in complaint(store, trial.id)
-
-
-def test_an_infinity_written_as_a_huge_number_does_not_pass_under_the_seal(store: Store, make_result: Make) -> None:
-    result = make_result(metrics={"m": float("inf")})
-    store.put(result, {})
-    path = store.record_path(result.id)
-    path.write_text(path.read_text().replace('"m":"inf"', '"m":1e999'))
-    complaint(store, result.id)
-
-
-def test_a_key_named_twice_is_refused(store: Store, trial: TrialResult) -> None:
-    path = store.record_path(trial.id)
-    path.write_text(path.read_text().replace('"status":', '"status":"crashed","status":'))
-    assert "not one whole JSON text" in complaint(store, trial.id)
+    path.write_text(edit(path.read_text()))
+    assert said in complaint(store, trial.id)
 
 
 @pytest.mark.parametrize("schema", [2, 10**6])
@@ -134,35 +126,24 @@ def test_a_record_of_a_later_release_is_left_where_it_is(
     assert str(problem).endswith("(left there)")
 
 
-@pytest.mark.parametrize("schema", [0, "1", True, None])
-def test_another_schema_is_named(store: Store, trial: TrialResult, edit_record: Edit, schema: Any) -> None:
-    edit_record(store.record_path(trial.id), schema=schema)
-    assert f"its schema is {schema!r}" in complaint(store, trial.id)
-
-
 @pytest.mark.parametrize(
     ("fields", "reason"),
     [
+        *(({"schema": schema}, f"its schema is {schema!r}") for schema in (0, "1", True, None)),
+        ({"\x1b]0;owned\x07\n": 1}, r"missing or unknown: \x1b]0;owned"),
         ({"status": "fine"}, "its status field is not as the schema says: Invalid enum value 'fine'"),
         ({"status": ["done"]}, "its status field is not as the schema says: Expected `str`, got `array`"),
         ({"seed": 1}, "seed"),
         ({"seed": -1}, "seed"),
-        ({"seed": False}, "seed"),
         ({"seed": "0"}, "seed"),
         ({"spec": []}, "its spec field is not as the schema says: Expected `object`, got `array`"),
         ({"spec": {"seed": 0}}, "hash of its specification"),
         ({"condition": "0" * 64}, "condition"),
-        ({"condition": 7}, "condition"),
         ({"digest": "abc"}, "digest"),
-        ({"digest": 7}, "digest"),
         ({"champion": "../champion"}, "champion"),
-        ({"champion": None}, "champion"),
-        ({"metrics": None}, "metrics"),
         ({"metrics": {"m": True}}, "metrics"),
         ({"metrics": {"m": "Infinity"}}, "metrics"),
-        ({"metrics": {"m": [1.0]}}, "metrics"),
         ({"levels": {"success": 1.0}}, "levels"),
-        ({"levels": {"success": "nan"}}, "levels"),
         ({"curves": {"best": [None]}}, "curves"),
         ({"curves": {"best": [1.0], "mean": []}}, "equally long"),
         ({"timing": "1 s"}, "timing"),
@@ -174,13 +155,8 @@ def test_a_field_of_the_wrong_kind_is_refused_even_under_a_right_seal(
     store: Store, trial: TrialResult, edit_record: Edit, fields: dict[str, Any], reason: str
 ) -> None:
     edit_record(store.record_path(trial.id), **fields)
-    assert reason in complaint(store, trial.id)
-
-
-def test_a_missing_field_is_named(store: Store, trial: TrialResult, edit_record: Edit) -> None:
-    path = store.record_path(trial.id)
-    path.write_text(json.dumps({k: v for k, v in json.loads(path.read_text()).items() if k != "timing"}))
-    assert "missing or unknown: timing" in complaint(store, trial.id)
+    assert reason in (text := complaint(store, trial.id))
+    assert text.isprintable()
 
 
 def test_a_record_under_another_trials_name_is_foreign(store: Store, trial: TrialResult, make_result: Make) -> None:
@@ -188,14 +164,6 @@ def test_a_record_under_another_trials_name_is_foreign(store: Store, trial: Tria
     store.record_path(other.id).parent.mkdir(parents=True, exist_ok=True)
     store.record_path(trial.id).rename(store.record_path(other.id))
     assert f"it holds another trial, {trial.id}" in complaint(store, other.id)
-
-
-def test_control_characters_of_a_record_never_reach_the_terminal(
-    store: Store, trial: TrialResult, edit_record: Edit
-) -> None:
-    edit_record(store.record_path(trial.id), **{"\x1b]0;owned\x07\n": 1})
-    text = complaint(store, trial.id)
-    assert text.isprintable()
 
 
 def test_a_swapped_champion_is_refused(store: Store, trial: TrialResult, make_result: Make) -> None:

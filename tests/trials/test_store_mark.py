@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -29,13 +29,6 @@ def contents(folder: Path) -> dict[str, bytes | None]:
     }
 
 
-def older(store: Store) -> Store:
-    """Make a store one that was written before stores were marked."""
-    (store.root / MARK).unlink()
-    (store.root / ".gitignore").unlink()
-    return store
-
-
 def test_the_first_file_of_a_store_comes_with_its_mark_and_is_kept_from_git(store: Store, trial: TrialResult) -> None:
     assert json.loads((store.root / MARK).read_text()) == {
         "program": "evoclaims",
@@ -49,7 +42,8 @@ def test_the_first_file_of_a_store_comes_with_its_mark_and_is_kept_from_git(stor
 def test_a_store_older_than_the_mark_is_read_and_marked_by_the_next_trial(
     store: Store, trial: TrialResult, make_result: Make
 ) -> None:
-    older(store)
+    (store.root / MARK).unlink()
+    (store.root / ".gitignore").unlink()
     for folder, name in (
         ("checkpoints", "a" * 64 + "-" + "b" * 16 + ".npz"),
         ("running", "c" * 64 + ".json"),
@@ -100,31 +94,24 @@ def test_an_empty_folder_and_one_that_is_not_there_may_become_stores(tmp_path: P
         check_store(root)
 
 
-@pytest.mark.parametrize("text", ["", "{}", "[]", "\x00", '{"program": "another"}', "[" * 100_000])
-def test_a_mark_that_says_something_else_is_no_mark(tmp_path: Path, text: str) -> None:
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        *((text, "written by evoclaims") for text in ("", "[]", "\x00", '{"program": "another"}', "[" * 100_000)),
+        ('{"program": "evoclaims", "schema": 2}', "has schema 2"),
+    ],
+)
+def test_a_mark_of_another_program_or_a_later_release_is_none(tmp_path: Path, text: str, said: str) -> None:
     (tmp_path / MARK).write_text(text)
-    with pytest.raises(UserError, match=r"is not a trial store: its store\.json was not written by evoclaims"):
+    with pytest.raises(UserError, match=said):
         check_store(tmp_path)
 
 
-def test_a_store_of_a_later_release_is_left_to_it(tmp_path: Path) -> None:
-    (tmp_path / MARK).write_text('{"program": "evoclaims", "schema": 2}')
-    with pytest.raises(UserError, match="has schema 2"):
-        check_store(tmp_path)
-
-
-def test_a_store_copied_over_another_is_one_store(store: Store, trial: TrialResult, tmp_path: Path) -> None:
-    other = Store(tmp_path / "other")
-    other.check_writable()
-    shutil.copytree(store.root, other.root, dirs_exist_ok=True)
-    other.check()
-    assert other.get(trial.id) == store.get(trial.id)
-
-
-def test_a_root_whose_name_is_too_long_or_leads_in_a_circle_is_a_sentence(tmp_path: Path) -> None:
+def test_a_root_that_can_be_no_folder_is_one_sentence_that_names_the_remedy(tmp_path: Path) -> None:
     (tmp_path / "circle").symlink_to("circle")
-    for name in ("x" * 300, "circle"):
-        with pytest.raises(UserError, match="--storage"):
+    (tmp_path / "file").write_text("not a folder")
+    for name, said in (("x" * 300, ""), ("circle", ""), ("file", "is a file, not a folder.*")):
+        with pytest.raises(UserError, match=f"{said}--claims-storage"):
             Store(tmp_path / name).check_writable()
 
 
@@ -137,3 +124,32 @@ def test_a_store_that_may_not_be_read_is_a_sentence(
     monkeypatch.setattr(os, "listdir", refuse)
     with pytest.raises(UserError, match="cannot be read: Permission denied"):
         store.check()
+
+
+@pytest.mark.parametrize("code", [errno.EROFS, errno.ENOSPC, errno.EACCES])
+def test_a_read_only_or_full_disk_is_found_at_the_start(
+    store: Store, monkeypatch: pytest.MonkeyPatch, code: int
+) -> None:
+    store.check_writable()
+
+    def refuse(*arguments: Any, **options: Any) -> None:
+        raise OSError(code, os.strerror(code))
+
+    monkeypatch.setattr(os, "replace", refuse)
+    if code == errno.EROFS:  # a read-only disk refuses to remove even a file that is not there
+        monkeypatch.setattr(Path, "unlink", refuse)
+    with pytest.raises(UserError, match=f"{os.strerror(code)}.*--claims-storage"):
+        store.check_writable()
+
+
+def test_a_disk_that_fills_up_leaves_no_record_of_the_trial(
+    store: Store, make_result: Make, parameters: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(descriptor: int) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(UserError, match="No space left"):
+        store.put(make_result(), parameters)
+    assert store.ids() == ()
+    assert not [path for path in store.root.rglob("*") if path.is_file()]

@@ -57,8 +57,8 @@ def _interleaved(monkeypatch: pytest.MonkeyPatch, order: str, puts: dict[str, Ca
 
 
 @pytest.mark.parametrize("order", ORDERS)
-def test_the_first_record_keeps_its_own_champion_in_every_order(
-    store: Store, make_result: Make, monkeypatch: pytest.MonkeyPatch, order: str
+def test_the_first_record_keeps_its_own_champion_and_equal_ones_are_stored_once_in_every_order(
+    store: Store, make_result: Make, parameters: dict[str, Any], monkeypatch: pytest.MonkeyPatch, order: str
 ) -> None:
     champions = {"A": {"w": np.zeros(3)}, "B": {"w": np.ones(3)}}
     numbers = {"A": 0.75, "B": 0.0}
@@ -76,15 +76,10 @@ def test_the_first_record_keeps_its_own_champion_in_every_order(
     assert len(store.champion_files(kept.id)) == 1
     assert verify(store, repair=False) == []
     assert not list(store.root.rglob("*.tmp"))
-
-
-@pytest.mark.parametrize("order", ORDERS)
-def test_equal_trials_are_stored_once_in_every_order(
-    store: Store, make_result: Make, parameters: dict[str, Any], monkeypatch: pytest.MonkeyPatch, order: str
-) -> None:
-    puts = {name: lambda: store.put(make_result(), parameters) for name in "AB"}
+    equal = make_result(seed=1)
+    puts = {name: lambda: store.put(equal, parameters) for name in "AB"}
     assert sorted(_interleaved(monkeypatch, order, puts).values()) == ["present", "stored"]
-    assert store.champion_of(store.get(make_result().id)).keys() == parameters.keys()
+    assert store.champion_of(store.get(equal.id)).keys() == parameters.keys()
     assert verify(store, repair=False) == []
 
 
@@ -115,19 +110,18 @@ def test_a_champion_that_a_killed_process_left_is_a_leftover_once_settled(store:
     assert store.champion_of(store.get(raced.id))["w"].tolist() == [1.0, 1.0, 1.0]
 
 
-def test_a_damaged_record_takes_all_its_champions_aside(store: Store, raced: TrialResult) -> None:
-    files = store.champion_files(raced.id)
-    store.record_path(raced.id).write_bytes(b"torn")
-    assert {problem.path for problem in verify(store, repair=True)} == {store.record_path(raced.id), *files}
-    assert store.champion_files(raced.id) == ()
-
-
-def test_a_champion_beside_the_usual_place_that_is_torn_is_named(store: Store, raced: TrialResult) -> None:
+def test_a_torn_champion_beside_the_usual_place_is_named_and_a_damaged_record_takes_all_aside(
+    store: Store, raced: TrialResult
+) -> None:
     spare = store.champion_file(raced)
     assert spare != store.champion_path(raced.id)
     spare.write_bytes(b"torn")
     problems = {problem.path: problem.kind for problem in verify(store, repair=False)}
     assert problems == {store.record_path(raced.id): "record", spare: "champion"}
+    files = store.champion_files(raced.id)
+    store.record_path(raced.id).write_bytes(b"torn")
+    assert {problem.path for problem in verify(store, repair=True)} == {store.record_path(raced.id), *files}
+    assert store.champion_files(raced.id) == ()
 
 
 @pytest.mark.parametrize("name", ["{id}.0123.npz", "{id}.0123456789abcdeg.npz", "{id}.0123456789abcdef.npy"])
@@ -135,15 +129,6 @@ def test_a_name_that_is_no_champions_is_foreign(store: Store, trial: TrialResult
     path = store.champion_path(trial.id).with_name(name.format(id=trial.id))
     path.write_bytes(b"")
     assert [(problem.kind, problem.path) for problem in verify(store, repair=False)] == [("champion", path)]
-
-
-def test_a_crashed_trial_that_another_process_ran_again_meanwhile_keeps_a_matching_champion(
-    store: Store, make_result: Make
-) -> None:
-    store.put(make_result(status="crashed"), {"w": np.zeros(1)})
-    assert store.put(make_result(), {"w": np.ones(1)}) == "stored"
-    assert store.put(make_result(metrics={"mean_success": 0.0}), {"w": np.full(1, 2.0)}) == "differs"
-    assert store.champion_of(store.get(make_result().id))["w"].tolist() == [1.0]
 
 
 def test_a_trial_that_ended_in_another_process_meanwhile_is_not_replaced_by_one_out_of_time(
@@ -164,19 +149,15 @@ def test_a_trial_that_ended_in_another_process_meanwhile_is_not_replaced_by_one_
     assert kept.status == "done"
 
 
-@pytest.fixture(params=["links", "no links"])
-def file_system(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
-    """With and without hard links."""
-
+@pytest.mark.parametrize("links", [True, False])
+def test_a_file_written_once_stays_as_the_first_has_written_it_also_where_there_are_no_hard_links(
+    tmp_path: Path, links: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def refuse(*arguments: Any) -> None:
         raise PermissionError(1, "Operation not permitted")
 
-    if request.param == "no links":
+    if not links:
         monkeypatch.setattr(os, "link", refuse)
-    return str(request.param)
-
-
-def test_a_file_written_once_stays_as_the_first_has_written_it(tmp_path: Path, file_system: str) -> None:
     path = tmp_path / "folder" / "file"
     assert write_once(path, b"first") is True
     assert write_once(path, b"second") is False

@@ -145,12 +145,6 @@ def test_a_batch_that_had_no_time_to_begin_is_stored_without_a_curve(
     assert digests(run_climbers(store, cpus)) == digests(uninterrupted)
 
 
-def test_under_a_limit_that_is_not_reached_trials_come_out_to_the_same_bits(
-    store: Store, cpus: list[Any], uninterrupted: list[TrialResult]
-) -> None:
-    assert digests(_run(store, cpus, 86_400.0)) == digests(uninterrupted)
-
-
 @pytest.mark.parametrize("waits", [True, False])
 def test_waiting_for_another_process_costs_no_time(waits: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     now, begun, late = 0.0, threading.Event(), threading.Event()
@@ -197,12 +191,9 @@ def test_the_clock_stands_while_any_thread_waits(monkeypatch: pytest.MonkeyPatch
     assert waiting.working_time() - began == 2
 
 
-def test_without_a_limit_the_work_stays_on_its_thread_and_with_one_it_has_its_own() -> None:
+def test_with_a_limit_the_work_has_a_thread_of_its_own_and_what_it_raises_is_raised() -> None:
     assert Allowance(math.inf).spend(threading.current_thread) is threading.current_thread()
     assert Allowance(600.0).spend(threading.current_thread).daemon
-
-
-def test_what_the_work_raises_is_raised() -> None:
     for seconds in (math.inf, 600.0):
         with pytest.raises(ZeroDivisionError):
             Allowance(seconds).spend(lambda: 1 // 0)
@@ -274,9 +265,6 @@ def test_time_in_which_the_process_was_stopped_does_not_count(monkeypatch: pytes
 def test_a_time_is_a_number_and_its_unit(number: int, unit: tuple[str, float], space: str) -> None:
     assert seconds_of(f"{number}{space}{unit[0]}") == number * unit[1]
     assert seconds_of(f"{number}.5{space}{unit[0]}") == (number + 0.5) * unit[1]
-
-
-def test_no_limit_is_none_and_the_usual_one_is_hours() -> None:
     assert seconds_of("none") == math.inf
     assert seconds_of(DEFAULT_LIMIT) >= 3600.0
 

@@ -122,18 +122,32 @@ def test_a_loop_may_fork_and_what_it_has_forked_ends_with_it(store: Store, cpus:
 
 
 def test_what_a_loop_does_in_an_odd_way_is_understood_or_is_a_crash_that_says_what_it_was(
-    store: Store, cpus: list[Any]
+    tmp_path: Path, store: Store, cpus: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    (tmp_path / "traceback.py").write_text("raise SystemExit('a file where a loop is started is no module')")
+    monkeypatch.chdir(tmp_path)
+    held: list[int] = []
+    close = Child.close
+
+    def noted(self: Child) -> str:
+        reason = close(self)
+        held.append(len(self._printed))
+        return reason
+
+    monkeypatch.setattr(Child, "close", noted)
     odd = condition(toy_loops.in_odd_ways, clip=math.inf)
-    good, *crashed = run(odd, range(5), store, cpus, time_limit=30.0)
+    good, *crashed = run(odd, range(6), store, cpus, time_limit=30.0)
     assert (good.metrics["last_fitness"], good.metrics["unbounded"]) == (0.25, 1.0)
     assert good.metrics["environment_steps"] == 55
-    assert [one.status for one in crashed] == ["crashed"] * 4
-    too_far, long, unnamed, reading = map(failed.why, crashed)
+    assert [one.status for one in crashed] == ["crashed"] * 5
+    too_far, long, unnamed, reading, loud = map(failed.why, crashed)
     assert too_far.endswith(f"A training function reports {2**60} steps. Report a number from 0 to {2**53}.")
     assert long == "ValueError: " + "x" * 488
     assert unnamed.endswith(r"'a name that is no \udc80 text' is 1.0.")
     assert reading == "EOFError: EOF when reading a line"
+    assert loud == "its process ended with status 3"
+    assert crashed[-1].provenance["crash"].endswith("the end\nits process ended with status 3")
+    assert max(held) == 2**16  # of five megabytes
 
 
 @pytest.mark.parametrize("name", ["mean_success", "last_success"])
@@ -148,16 +162,12 @@ def test_a_success_that_is_no_share_is_a_crash_that_says_so(store: Store, cpus: 
 
 
 def test_a_report_is_checked_however_soon_it_comes_after_another() -> None:
+    """A counter that begins again in each epoch would hide what training has spent."""
     report = Reporter(100, lambda answer: None)
     report(0, success=0.5)
     with pytest.raises(UserError, match="A training loop reports a success of 7"):
         report(1, success=7)
-
-
-def test_steps_that_fall_are_refused() -> None:
-    """A counter that begins again in each epoch would hide what training has spent."""
-    report = Reporter(100, lambda answer: None)
-    for step in (0, 5, 5, 250):
+    for step in (5, 5, 250):
         report(step)
     with pytest.raises(UserError, match="reports step 3 after step 250. Report the steps since training began"):
         report(3)
@@ -170,17 +180,9 @@ def test_threads_of_a_loop_report_without_mixing_their_lines(store: Store, cpus:
     assert told.curves["number 699"][-1] == 699.0
 
 
-def test_a_file_where_it_is_started_takes_the_place_of_no_module(
-    tmp_path: Path, store: Store, cpus: list[Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "traceback.py").write_text("raise SystemExit('not this one')")
-    monkeypatch.chdir(tmp_path)
-    (good,) = run(IN_EVERY_WAY, [0], store, cpus)
-    assert good.status == "done"
-
-
 def test_a_policy_is_examined_as_all_are_be_it_of_numpy_or_of_jax(store: Store, cpus: list[Any]) -> None:
-    right, wrong = run(condition(toy_loops.knows_parity, NParity(3)), range(2), store, cpus)
+    right, wrong, again = run(condition(toy_loops.knows_parity, NParity(3)), range(3), store, cpus)
+    assert right.provenance["returned"] == again.provenance["returned"] != wrong.provenance["returned"]
     assert right.levels["success"] == (1.0, 1.0)
     assert right.metrics["furthest_solved"] == 1.0
     assert right.metrics["rows"] == 8.0
@@ -220,21 +222,6 @@ def test_a_loop_that_never_returns_is_out_of_time_with_its_curves_until_it_is_al
     assert not (tmp_path / "pids").exists()
     (again,) = run(endless, [0], store, cpus, time_limit=3.5)
     assert again.timing["limit"] == 3.5
-
-
-def test_of_what_a_loop_prints_the_end_is_kept(store: Store, cpus: list[Any], monkeypatch: pytest.MonkeyPatch) -> None:
-    held: list[int] = []
-    close = Child.close
-
-    def noted(self: Child) -> str:
-        reason = close(self)
-        held.append(len(self._printed))
-        return reason
-
-    monkeypatch.setattr(Child, "close", noted)
-    (trial,) = run(condition(toy_loops.loud), [0], store, cpus)
-    assert trial.provenance["crash"].endswith("the end\nits process ended with status 3")
-    assert held == [2**16]
 
 
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="whether a process lives is read from /proc")
@@ -282,28 +269,20 @@ def test_an_interrupted_run_goes_on_with_the_trials_that_it_lacks(
     assert sorted(begun.read_text().split()) == ["2", "3", "4"]
 
 
-def test_another_version_of_a_declared_package_runs_it_again(
-    tmp_path: Path, store: Store, cpus: list[Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    begun = tmp_path / "begun"
-    noting = condition(toy_loops.notes, packages=("pytest",), file=str(begun))
-    (first,) = run(noting, [0], store, cpus)
-    assert first.provenance["versions"]["pytest"] == pytest.__version__
-    monkeypatch.setattr("evoclaims.core.packages.version_of", lambda name: "2.0")
-    run(noting, [0], store, cpus)
-    assert begun.read_text().split() == ["0", "0"]
-
-
-def test_stored_trials_of_any_version_are_read_where_their_package_is_not_installed(
+def test_another_version_of_a_declared_package_runs_it_again_unless_any_version_will_do(
     tmp_path: Path, store: Store, cpus: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     noting = condition(toy_loops.notes, packages=("pytest",), file=str(tmp_path / "begun"))
     (made,) = run(noting, [0], store, cpus)
+    assert made.provenance["versions"]["pytest"] == pytest.__version__
     monkeypatch.setattr("evoclaims.core.packages.version_of", lambda name: None)
     assert run(noting, [0], store, cpus, any_version=True) == [made]
     for seeds, any_version in (([0], False), ([0, 1], True)):
         with pytest.raises(UserError, match="needs pytest, which is not installed. Install it: pip install pytest"):
             run(noting, seeds, store, cpus, any_version=any_version)
+    monkeypatch.setattr("evoclaims.core.packages.version_of", lambda name: "2.0")
+    run(noting, [0], store, cpus)
+    assert (tmp_path / "begun").read_text().split() == ["0", "0"]
 
 
 def test_policies_are_told_from_each_other_by_their_actions_on_fixed_starts() -> None:
@@ -331,11 +310,6 @@ def test_a_policy_that_draws_or_remembers_is_refused(task: Any) -> None:
         with pytest.raises(UserError, match="on the same observation. It must be a function of the observation alone"):
             actions_of(task, policy)
     assert actions_of(NParity(3), lambda seen: [0.5 + 1e-6 * random.random()])[1]
-
-
-def test_what_training_gave_is_recorded_apart_from_the_examination(store: Store, cpus: list[Any]) -> None:
-    first, second, third = run(condition(toy_loops.knows_parity, NParity(3)), range(3), store, cpus)
-    assert first.provenance["returned"] == third.provenance["returned"] != second.provenance["returned"]
 
 
 def test_a_loops_wait_for_a_kernel_stops_its_clock(

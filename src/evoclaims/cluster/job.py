@@ -157,7 +157,6 @@ def clock(minutes: int) -> str:
 
 
 def _site(table: Mapping[str, object]) -> _Table:
-    """Return the site's defaults."""
     try:
         return convert({key: table[key] for key in _Table.__dataclass_fields__ if key in table}, _Table)
     except ValidationError as error:
@@ -184,7 +183,6 @@ def _option(key: str, value: object) -> tuple[str, Any]:
 
 
 def _count(option: str, value: int, least: int) -> int:
-    """Return a number from `least` up."""
     if value < least:
         raise UserError(f"{option} takes a number from {least} up, not {value}.")
     return value

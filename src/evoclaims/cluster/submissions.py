@@ -207,7 +207,6 @@ def _accounts(jobs: Sequence[str]) -> dict[str, Seen]:
 
 
 def _seen(state: str, reason: str, nodes: str) -> Seen:
-    """Return what SLURM's words mean."""
     if state in WAITING:
         return Seen(State.QUEUED, reason)
     if state in AT_WORK:

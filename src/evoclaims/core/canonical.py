@@ -65,7 +65,6 @@ def fields_of(value: Any) -> dict[str, Any]:
 
 @functools.cache
 def _canonical_fields(kind: type) -> tuple[dataclasses.Field[Any], ...]:
-    """Return the fields of a dataclass that may be part of its canonical form."""
     return tuple(field for field in dataclasses.fields(kind) if field.metadata.get("canonical", True))
 
 

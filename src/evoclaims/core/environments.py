@@ -252,7 +252,6 @@ def _oldest(project: Path) -> dict[str, Version]:
 
 
 def _made(recipe: Recipe, empty: Environment, project: Path, pins: str) -> Environment:
-    """Make an environment in a folder that is not there yet."""
     if recipe.is_layer:
         _begin_layer(empty.folder)
         _run([str(empty.python), *PIP, "install", *recipe.release])

@@ -160,7 +160,6 @@ def _aside(path: Path, data: bytes, elsewhere: str, mode: int = 0o666) -> Iterat
 
 
 def _unwritten(path: Path, error: OSError, elsewhere: str) -> StorageError:
-    """Return the error that says why a file was not written, and what to do."""
     way = f"Free some space, or {elsewhere}" if error.errno in _FULL else f"{elsewhere[0].upper()}{elsewhere[1:]}"
     return StorageError(f"Cannot write {path}: {error.strerror or error}. {way}")
 

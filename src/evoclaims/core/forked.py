@@ -34,7 +34,6 @@ def _jax_runs() -> bool:
 
 
 def _note() -> None:
-    """Note in a forked process whether jax had started before."""
     global _forked_with_jax
     _forked_with_jax = _forked_with_jax or _jax_runs()
 

@@ -117,7 +117,6 @@ def short_hash(versions: Versions) -> str:
 
 
 def _set(versions: Versions) -> dict[str, str | None]:
-    """Return versions without flags that are not set."""
     return {name: version for name, version in versions.items() if name != FLAGS or version is not None}
 
 

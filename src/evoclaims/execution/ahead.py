@@ -60,6 +60,7 @@ class Ahead:
         store: where trials are kept.
         limit: seconds that a batch may take.
         warn: receives what is to be known of processes that have died.
+        processes: how many run trials, at least one; known once they have started.
     """
 
     host: Host
@@ -68,24 +69,19 @@ class Ahead:
     store: Store
     limit: float
     warn: Callable[[str], None]
+    processes: int = 1
     _ended: dict[str, threading.Event] = field(default_factory=dict)
     _errors: dict[str, str] = field(default_factory=dict)
     _broken: BaseException | None = None
     _lock: threading.Lock = field(default_factory=threading.Lock)
     _workers: Workers | None = None
     _stopping: bool = False
-    _processes: int = 1
     _thread: threading.Thread | None = None
 
     @property
     def platform(self) -> str:
         """Where trials run: "cpu" or "gpu"."""
         return "gpu" if self.host.gpus else devices.choose(self.order.device)[0].platform
-
-    @property
-    def processes(self) -> int:
-        """How many processes run trials, at least one."""
-        return self._processes
 
     def start(self, load: Workload, seeds: Mapping[str, Sequence[int]]) -> list[str]:
         """Begin to run what claims lack; return the claims in the order in which their trials should be there.
@@ -104,7 +100,7 @@ class Ahead:
             if run.seats:
                 runs.append(run)
                 ends |= run.ends(load, max(ends.values(), default=0.0))
-        self._processes = max((len(run.seats) for run in runs), default=1)
+        self.processes = max((len(run.seats) for run in runs), default=1)
         self._ended = {name: threading.Event() for name in ends}
         if runs:
             self._thread = threading.Thread(target=self._run, args=(runs,), daemon=True)
@@ -169,7 +165,6 @@ class Ahead:
         return TierRun(replace(self.order, tier=tier), seats, groups, jobs)
 
     def _run(self, runs: Sequence[TierRun]) -> None:
-        """Run everything, on a thread of its own."""
         try:
             for run in runs:
                 for ended in self._started(run.order, run.seats).run(run.groups):

@@ -189,37 +189,27 @@ def drop_finished_checkpoints(stored: StoredTrials) -> None:
 
 
 def _resumed(run: Run, interrupted: Header) -> Batch | None:
-    """Load an interrupted batch from its checkpoint onto the devices; None when another process has finished it."""
-    restored = _restored(run, interrupted)
-    if restored is None:
+    """Load an interrupted batch from its checkpoint onto the devices; None when another process has finished it.
+
+    A process that seemed dead may have continued the batch since its header was read, perhaps hours ago. So header
+    and state are read again, together: from two different moments they would mix into a wrong trial.
+    """
+    folder, lanes = run.store.checkpoints, run.lanes
+    owed = sum(not run.stored.has(seed) for seed in interrupted.seeds)
+    run.watch(RunProgress(run.condition.label, "resuming", owed))
+    while (header := checkpoint.newest(folder, interrupted)) is not None:
+        state = checkpoint.restore(folder, header, lanes.shapes(len(header.lanes)))
+        if state is not None:
+            break
+    else:
         return None
-    header, state = restored
-    lanes, width = run.lanes, len(header.lanes)
     stored = frozenset(filter(run.stored.has, header.seeds))
     if lanes.layout.alone:
         # Bits do not depend on other lanes: a lane whose trial is stored becomes idle, and costs nothing.
         header = replace(header, lanes=[None if seed in stored else seed for seed in header.lanes])
         state = replace(state, idle=state.idle | np.array([seed is None for seed in header.lanes]))
         stored = frozenset()
-    return Batch(header, lanes.place(state, width), int(np.max(state.steps)), stored)
-
-
-def _restored(run: Run, interrupted: Header) -> tuple[Header, TrialState] | None:
-    """Return header and state of an interrupted batch from its checkpoint, or None when that is gone.
-
-    A process that seemed dead may have continued the batch since its header was read, perhaps hours ago. So header
-    and state are read again, together: from two different moments they would mix into a wrong trial.
-    """
-    folder = run.store.checkpoints
-    owed = sum(not run.stored.has(seed) for seed in interrupted.seeds)
-    run.watch(RunProgress(run.condition.label, "resuming", owed))
-    header = checkpoint.newest(folder, interrupted)
-    while header is not None:
-        state = checkpoint.restore(folder, header, run.lanes.shapes(len(header.lanes)))
-        if state is not None:
-            return header, state
-        header = checkpoint.newest(folder, interrupted)
-    return None
+    return Batch(header, lanes.place(state, len(header.lanes)), int(np.max(state.steps)), stored)
 
 
 def _planned(lanes: Lanes, seeds: Sequence[int]) -> Header:

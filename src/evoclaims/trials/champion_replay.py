@@ -64,7 +64,14 @@ def unpacked(arrays: Mapping[str, NDArray[Any]], condition: Condition, result: T
     shapes = jax.eval_shape(lambda: _policy(condition).parameters)
     if result.status in ("timeout", "crashed") or (not arrays and jax.tree.leaves(shapes)):
         raise UserError(f"Seed {result.seed} of {condition.label} has no champion: it is {result.status}.")
-    return _filled(shapes, arrays, f"The champion of {condition.label}, seed {result.seed},")
+    expected = {name: (leaf.shape, leaf.dtype) for name, leaf in named_leaves(shapes).items()}
+    if {name: (array.shape, array.dtype) for name, array in arrays.items()} != expected:
+        raise UserError(
+            f"The champion of {condition.label}, seed {result.seed}, does not have the arrays of this method's "
+            "policies, so another version of the code made it. Name another store with --storage, or check that "
+            "version out."
+        )
+    return jax.tree.unflatten(jax.tree.structure(shapes), [arrays[name] for name in expected])
 
 
 def replay(condition: Condition, result: TrialResult, parameters: Any, devices: Sequence[jax.Device]) -> Replay:
@@ -97,14 +104,3 @@ def _policy(condition: Condition) -> Policy:
     """Return an untrained policy of the condition; its trained policies differ only in their parameters."""
     method, task = condition.method, condition.task
     return method.best(task, method.init(trial_key(0, TRAINING), task))
-
-
-def _filled(shapes: Any, arrays: Mapping[str, NDArray[Any]], what: str) -> Any:
-    """Return the tree of `shapes` with its leaves taken from `arrays` by name."""
-    expected = {name: (leaf.shape, leaf.dtype) for name, leaf in named_leaves(shapes).items()}
-    if {name: (array.shape, array.dtype) for name, array in arrays.items()} != expected:
-        raise UserError(
-            f"{what} does not have the arrays of this method's policies, so another version of the code "
-            "made it. Name another store with --storage, or check that version out."
-        )
-    return jax.tree.unflatten(jax.tree.structure(shapes), [arrays[name] for name in expected])

@@ -105,7 +105,6 @@ def traced_progress(method: Method[Any], task: Task) -> Progress:
 
 
 def _policy(method: Method[Any], task: Task, state: Any) -> Policy:
-    """Return the policy that a method has trained, which must be one."""
     policy = method.best(task, state)
     what = f"'best' of {method.name!r} returns"
     if not isinstance(policy, Policy):
@@ -163,7 +162,6 @@ def _key(seed: Int[Array, ""]) -> Array:
 
 
 def _check_task_state(task: Task, function: str, state: TaskState) -> None:
-    """Check the task state that `reset` or `step` returns."""
     what = f"the {function} of {task.name!r} gives"
     if not isinstance(state, TaskState):
         raise MisfitError(f"{what} {_kind(state)}, not a TaskState")

@@ -75,7 +75,6 @@ def sweep(folder: Path, most: int | None = MOST_BYTES) -> None:
 
 
 def _entries(folder: Path) -> Iterator[Path]:
-    """Yield jax's entries."""
     with contextlib.suppress(OSError):
         yield from (folder / name for name in os.listdir(folder) if _ENTRY.fullmatch(name))
 

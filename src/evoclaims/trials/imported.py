@@ -66,7 +66,6 @@ class TrialRows:
         return [step for step in found if step is not None]
 
     def _seeds(self) -> list[int]:
-        """Return the table's seeds in the rows that are read."""
         found = self.table.numbers(self.seed, "the seeds", self.chosen, rounded=True)
         for row, seed in zip(self.chosen, found, strict=True):
             if seed is None or not seed.is_integer():
@@ -269,7 +268,6 @@ class Imported(Condition):
 
     @cached_property
     def _rows(self) -> TrialRows:
-        """The rows of the table that are read, and which trial each is of."""
         return TrialRows(self.table, self.where, self.seed, self.step)
 
     def _trial(self, number: int, seed: int, rows: Sequence[int]) -> TrialResult:

@@ -129,7 +129,6 @@ def _champions(store: Store) -> Iterator[Problem]:
 
 
 def _checkpoints(store: Store, fault: Callable[[Path], str | None]) -> Iterator[Problem]:
-    """Ask `fault` about every checkpoint file."""
     for path in sorted(store.checkpoints.rglob("*")):
         if path.is_file() and not path.name.startswith("."):
             reason = fault(path)

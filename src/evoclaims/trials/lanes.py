@@ -150,7 +150,6 @@ class Lanes:
     @staticmethod
     @contextmanager
     def _settings() -> Iterator[None]:
-        """Set the context for tracing and compiling."""
         with jax.default_matmul_precision(MATMUL_PRECISION), warnings.catch_warnings():
             # A kill can damage an entry of jax's cache; jax recompiles it and warns, which must not fail in pytest.
             warnings.filterwarnings("ignore", "Error (reading|writing) persistent compilation cache")

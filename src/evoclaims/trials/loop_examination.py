@@ -74,7 +74,6 @@ def _fitted(task: Task, policy: Callable[[Any], Any]) -> Callable[[Array], Array
 
 
 def _depends(program: Any) -> bool:
-    """Whether what a program returns depends on what it is given."""
     needed = {id(one) for one in program.outvars}
     for step in reversed(program.eqns):
         if any(id(one) in needed for one in step.outvars):

@@ -202,6 +202,5 @@ class Program:
         return task.with_numbers(trial.numbers) if isinstance(task, Numbered) else task
 
     def _ended(self, trial: TrialState) -> Bool[Array, ""]:
-        """Whether no further step will be taken."""
         done = trial.diverged | trial.idle | (trial.steps >= self.condition.steps)
         return done if self.condition.progression == "whole_budget" else done | trial.ascent.finished

@@ -234,24 +234,20 @@ def parse(data: bytes | str) -> TrialResult:
         reason = f"its schema is {schema!r} and this version of evoclaims reads schema {SCHEMA}"
         raise RecordError(reason, later=isinstance(schema, int) and schema > SCHEMA)
     if plain.keys() != _FIELDS:
-        _fail(f"these fields are missing or unknown: {', '.join(sorted(plain.keys() ^ _FIELDS))}")
+        raise RecordError(f"these fields are missing or unknown: {', '.join(sorted(plain.keys() ^ _FIELDS))}")
     if not _is_sealed(data, plain):
-        _fail("its contents do not match its seal, so it was torn or edited")
+        raise RecordError("its contents do not match its seal, so it was torn or edited")
     record = check(plain)
     spec = record.spec
     if type(spec.get("seed")) is not int or spec["seed"] != record.seed:
-        _fail("its seed does not agree with its specification")
+        raise RecordError("its seed does not agree with its specification")
     if _hash_of_json(spec) != record.id:
-        _fail("its id is not the hash of its specification")
+        raise RecordError("its id is not the hash of its specification")
     if _hash_of_json({key: value for key, value in spec.items() if key != "seed"}) != record.condition:
-        _fail("its condition is not the hash of its specification without the seed")
+        raise RecordError("its condition is not the hash of its specification without the seed")
     fields: dict[str, Any] = {name: getattr(record, name) for name in _FIELDS - {"schema", "seal"}}
     fields["metrics"] = {name: _number(value) for name, value in record.metrics.items()}
     return TrialResult(**{**fields, "levels": _vectors(record.levels), "curves": _vectors(record.curves)})
-
-
-def _fail(reason: str) -> NoReturn:
-    raise RecordError(reason)
 
 
 def _is_sealed(data: bytes, plain: dict[str, Any]) -> bool:
@@ -271,10 +267,10 @@ def _load(data: bytes) -> dict[str, Any]:
         plain = json.loads(
             data.decode("utf-8"), parse_int=_whole, parse_constant=_no_constant, object_pairs_hook=_unique
         )
-    except (ValueError, RecursionError):
-        _fail("it is not one whole JSON text")
+    except (ValueError, RecursionError) as error:
+        raise RecordError("it is not one whole JSON text") from error
     if not isinstance(plain, dict):
-        _fail("it is not a JSON object")
+        raise RecordError("it is not a JSON object")
     return plain
 
 
@@ -307,7 +303,6 @@ def _vectors(fields: Mapping[str, Vector]) -> dict[str, tuple[float, ...]]:
 
 
 def _number(value: Number) -> float:
-    """Return a number, with "nan", "inf" and "-inf" turned back into floats."""
     return _WORDS[value] if isinstance(value, str) else value
 
 
@@ -315,7 +310,7 @@ def _hash_of_json(plain: Any) -> str:
     """Return `content_hash` of what was read from JSON, which does not need `as_plain`."""
     try:
         return hashlib.sha256(_ENCODER.encode(plain).encode("ascii")).hexdigest()
-    except RecursionError:
-        _fail("it is nested too deeply")
-    except ValueError:  # 1e999, which Python reads as infinite and the seal would confuse with "inf"
-        _fail("a number in it is too large")
+    except RecursionError as error:
+        raise RecordError("it is nested too deeply") from error
+    except ValueError as error:  # 1e999, which Python reads as infinite and the seal would confuse with "inf"
+        raise RecordError("a number in it is too large") from error

@@ -256,7 +256,6 @@ def _give_up(run: Run, header: Header) -> None:
 
 
 def _timing(run: Run, header: Header) -> dict[str, Any]:
-    """Return the timing for the records of a batch's trials."""
     timing = {
         "run": header.run_seconds,
         "compile": header.compile_seconds + run.lanes.seconds,
@@ -381,7 +380,6 @@ def _bodies(plain: Any) -> Iterator[tuple[str, str]]:
 
 
 def _without_bodies(plain: Any) -> Any:
-    """Return a condition's plain form without its robots' body hashes."""
     if isinstance(plain, Mapping):
         return {name: _without_bodies(part) for name, part in plain.items() if not (name == "body" and "xml" in plain)}
     return [_without_bodies(part) for part in plain] if isinstance(plain, list | tuple) else plain

@@ -110,7 +110,6 @@ def _is_deaf(frame: FrameType | None) -> bool:
 
 
 def _send_again(number: int) -> None:
-    """Send this process a signal, a little later."""
     time.sleep(AGAIN_SECONDS)
     os.kill(os.getpid(), number)
 

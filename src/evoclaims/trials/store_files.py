@@ -174,7 +174,6 @@ def mark(root: Path) -> None:
 
 
 def _check_mark(path: Path) -> None:
-    """Reject a mark of another program or a later release."""
     try:
         plain: Any = read_json(path)
     except (OSError, ValueError):
