@@ -171,6 +171,9 @@ def test_a_report_is_checked_however_soon_it_comes_after_another() -> None:
         report(step)
     with pytest.raises(UserError, match="reports step 3 after step 250. Report the steps since training began"):
         report(3)
+    with pytest.raises(UserError, match=r"reports 250\.5 steps. Report a whole number"):
+        report(250.5)  # type: ignore[arg-type]
+    report(np.float32(250.0))  # type: ignore[arg-type]
     assert report.last == 250
 
 

@@ -82,6 +82,8 @@ class Reporter:
         Raises:
             UserError: when the step is not a count or falls, a value is not a number, or the success is not a share.
         """
+        if step != int(step):
+            raise UserError(f"A training function reports {step!r} steps. Report a whole number.")
         step = int(step)
         if not 0 <= step <= MOST_STEPS:
             raise UserError(f"A training function reports {step} steps. Report a number from 0 to {MOST_STEPS}.")
