@@ -114,9 +114,3 @@ def test_a_smallest_network_that_does_not_fit_is_one_sentence(nodes: int, connec
     settings = Settings(population=200, nodes=nodes, connections=connections, species=Species(most=4))
     with pytest.raises(UserError, match="starts with 8 nodes and 12 connections, but nodes="):
         first_population(jax.random.key(0), settings, 6, 2)
-
-
-def test_nothing_about_a_population_is_weakly_typed() -> None:
-    shapes = jax.eval_shape(lambda key: first_population(key, INITIAL, 2, 1), jax.random.key(0))
-    assert {leaf.dtype for leaf in jax.tree.leaves(shapes)} == {jnp.dtype("int32"), jnp.dtype("float32")}
-    assert not [leaf for leaf in jax.tree.leaves(shapes) if leaf.weak_type]
