@@ -97,7 +97,7 @@ def _batches(inputs: int, hidden: int, outputs: int, case: str) -> tuple[jax.Arr
 
 
 @pytest.mark.parametrize("case", BATCHED)
-@pytest.mark.parametrize(("inputs", "hidden", "outputs"), [(1, 0, 1), (2, 1, 2), (3, 2, 1), (6, 24, 2)])
+@pytest.mark.parametrize(("inputs", "hidden", "outputs"), [(1, 0, 1), (3, 2, 1), (6, 24, 2)])
 def test_batched_and_in_loops_every_way_computes_the_same(inputs: int, hidden: int, outputs: int, case: str) -> None:
     network, loop, other = (jax.jit(way) for way in _ways(hidden, outputs, BATCHED[case]))
     given_ = _batches(inputs, hidden, outputs, case)
