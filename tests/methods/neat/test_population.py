@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from genomes import at, check, same
 from history import FIRST_KEY, History
 
 from evoclaims.core.errors import UserError
-from evoclaims.methods.neat.population import Population, first_population, forget_records
+from evoclaims.methods.neat.population import Population, first_population
 from evoclaims.methods.neat.settings import Attribute, Mutation, Settings, Species
 
 pytestmark = pytest.mark.newest
@@ -55,17 +53,6 @@ def test_a_new_key_appears_in_one_genome_and_a_lost_one_never_comes_back(history
         before = set().union(*hidden)
 
 
-def test_keys_that_float32_cannot_hold_are_exact(history: History) -> None:
-    keys = np.asarray(history.populations.genomes.nodes.key[-1])
-    assert (keys.astype(np.float32).astype(np.int64) != keys).any()
-
-
-def test_generations_are_counted_and_keys_are_handed_out_in_step(history: History) -> None:
-    generations = np.arange(len(history.fitness) + 1)
-    np.testing.assert_array_equal(history.populations.generation, generations)
-    np.testing.assert_array_equal(history.populations.next_key, FIRST_KEY + generations * history.settings.population)
-
-
 @pytest.fixture(scope="module")
 def first() -> Population:
     """A first population of networks of three inputs and two outputs."""
@@ -99,14 +86,6 @@ def test_the_first_population_is_one_species_around_its_first_genome(first: Popu
     assert np.isneginf(np.asarray(species.best)).all()
     assert same(at(species.centres, 0), at(first.genomes, 0))
     assert int(first.next_key) == 5
-
-
-def test_forgotten_records_are_beaten_by_anything_and_nothing_else_changes(first: Population) -> None:
-    population = replace(first, species=replace(first.species, best=jnp.arange(4.0)))
-    forgotten = forget_records(population)
-    assert np.isneginf(np.asarray(forgotten.species.best)).all()
-    restored = replace(forgotten, species=replace(forgotten.species, best=population.species.best))
-    assert same(restored, population)
 
 
 @pytest.mark.parametrize(("nodes", "connections"), [(7, 12), (8, 11)])
