@@ -10,15 +10,20 @@ import pytest
 
 from evoclaims.core.errors import UserError
 from evoclaims.envs.base import Numbered
+from evoclaims.envs.gates.circuit import Circuit
 from evoclaims.trials.compatibility import traced_progress
 from evoclaims.trials.spec import Condition
 from reproductions.nisioti2025 import REPRODUCTION
 
 pytestmark = pytest.mark.slow
 
-CONDITIONS = REPRODUCTION.tier("full").conditions
+SMOKE = [(c.method, c.task) for c in REPRODUCTION.tier("smoke").conditions.values()]
+CONDITIONS = {n: c for n, c in REPRODUCTION.tier("full").conditions.items() if (c.method, c.task) not in SMOKE}
+"""Those that the smoke tier does not run."""
 # Each method with each kind of task, and each kind of task with each robot: what differs beyond is a number.
-KINDS = {(type(c.method), type(c.task)): names for names, c in CONDITIONS.items()}
+KINDS = {
+    (type(c.method), Circuit if isinstance(c.task, Circuit) else type(c.task)): names for names, c in CONDITIONS.items()
+}
 ROBOTS = {(type(c.task), getattr(c.task, "robot", None)): names for names, c in CONDITIONS.items()}
 
 

@@ -13,8 +13,6 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from gate_oracles import GATES, Gate, every_level, right_answers, table_policy
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.stats import chisquare
 
@@ -24,7 +22,6 @@ from evoclaims.envs.gates.parity import NParity
 
 pytestmark = pytest.mark.newest
 
-gates = pytest.mark.parametrize("gate", GATES.values(), ids=list(GATES))
 few = pytest.mark.parametrize("gate", [GATES[name] for name in list(GATES)[1::3]], ids=list(GATES)[1::3])
 """The parities of 3 and 6, and two of the ALUs: enough where the rows have been checked one by one."""
 
@@ -43,30 +40,6 @@ def _examiner(task: Any) -> Callable[[jax.Array], Episode]:
 def _examine(task: Any, answers: NDArray[Any]) -> Episode:
     """Examine a table of answers on every level; the leaves are NumPy arrays [levels]."""
     return jax.tree.map(np.asarray, _examiner(task)(jnp.asarray(answers, jnp.float32)))
-
-
-@gates
-def test_a_right_policy_succeeds_exactly_and_its_negation_fails_exactly(gate: Gate) -> None:
-    answers = right_answers(gate.last)
-    right = _examine(gate.task, answers)
-    assert (right.success == 1.0).all()
-    assert (right.fitness == 0.0).all()
-    wrong = _examine(gate.task, -answers)
-    assert (wrong.success == 0.0).all()
-    assert (wrong.fitness == -1.0).all()
-
-
-@few
-def test_one_wrong_output_costs_its_row_and_its_share_of_the_fitness(gate: Gate) -> None:
-    for row in range(0, len(gate.last), 7):
-        answers = right_answers(gate.last)
-        answers[row, 0] *= -1
-        episode = _examine(gate.task, answers)
-        outputs = sum(bit is not None for bit in gate.last[row].wanted)
-        for level, rows in enumerate(gate.task.table.rows_at_level):
-            hit = row < rows
-            assert episode.success[level] == pytest.approx((rows - hit) / rows, abs=1e-6)
-            assert episode.fitness[level] == pytest.approx(-hit / outputs / rows, abs=1e-7)
 
 
 @few
@@ -115,17 +88,9 @@ def test_an_exhaustive_episode_asks_every_row_once_in_order_and_pays_what_the_ex
             rewards.append(float(state.reward))
         assert shown == [line.shown for line in gate.lines(level)]
         assert np.mean(rewards) == pytest.approx(float(examined.fitness[level]), abs=1e-6)
-
-
-@few
-def test_an_exhaustive_training_episode_is_the_examination(gate: Gate) -> None:
-    answers = np.random.default_rng(2).normal(size=(len(gate.last), gate.task.action_size))
-    policy = table_policy(gate.task.table.inputs, answers)
-    examined = _examine(gate.task, answers)
-    level = jnp.asarray(gate.task.levels - 1, jnp.int32)
-    episode = jax.jit(lambda key: gate.task.episode(policy, key, level))(jax.random.key(5))
-    assert float(episode.fitness) == examined.fitness[-1]
-    assert float(episode.success) == examined.success[-1]
+    last = jnp.asarray(gate.task.levels - 1, jnp.int32)
+    trained = jax.jit(lambda key: gate.task.episode(policy, key, last))(jax.random.key(5))
+    assert (float(trained.fitness), float(trained.success)) == (examined.fitness[-1], examined.success[-1])
 
 
 @few
@@ -161,15 +126,6 @@ def test_a_sampled_episode_is_one_step_that_pays_its_rows_error(gate: Gate) -> N
     np.testing.assert_array_equal(np.asarray(episodes.fitness), np.asarray(ends.reward))
     # One right row must not pass for a solved level.
     assert set(np.asarray(episodes.success).tolist()) == {_examine(gate.task, answers).success[-1]}
-
-
-@settings(max_examples=25, deadline=None)
-@given(seed=st.integers(0, 2**31 - 1))
-def test_the_opposite_policy_has_the_opposite_fitness_on_one_output(seed: int) -> None:
-    answers = np.random.default_rng(seed).normal(size=(8, 1))
-    one, other = (_examine(NParity(3), sign * answers) for sign in (1, -1))
-    np.testing.assert_allclose(one.fitness + other.fitness, -1.0, atol=1e-6)
-    np.testing.assert_allclose(one.success + other.success, 1.0, atol=1e-6)
 
 
 @dataclass(frozen=True)

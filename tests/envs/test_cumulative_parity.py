@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from evoclaims.core.errors import UserError
 from evoclaims.envs.gates.parity import CumulativeParity, NParity
 
 
@@ -26,8 +25,3 @@ def test_a_level_asks_the_tables_of_all_levels_so_far(bits: int) -> None:
 def test_six_bits_ask_124_rows_on_the_last_of_five_levels() -> None:
     task = CumulativeParity(6)
     assert (task.levels, task.horizon, task.observation_size, task.action_size) == (5, 124, 6, 1)
-
-
-def test_a_wrong_number_of_bits_is_a_sentence() -> None:
-    with pytest.raises(UserError, match="has bits=1. Write a number from 2 to 12"):
-        CumulativeParity(1)

@@ -6,9 +6,8 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 import pytest
-from probes import CONSTANT, COPY, CURRICULUM, DELAYED, PROBES, SELECTION, SURVIVAL, Probe
+from probes import DELAYED, PROBES, SELECTION, SURVIVAL, Probe
 
 from evoclaims.envs.base import Episode, PolicyFn
 
@@ -18,23 +17,16 @@ YES: PolicyFn = lambda observation: jnp.ones(1)  # noqa: E731
 REPEAT: PolicyFn = lambda observation: observation[:1]  # noqa: E731
 EXCLUSIVE_OR: PolicyFn = lambda observation: -jnp.prod(observation, keepdims=True)  # noqa: E731
 MIDDLE: PolicyFn = lambda observation: observation[3:9].sum(keepdims=True) - 0.5  # noqa: E731
-SECOND_BIT: PolicyFn = lambda observation: observation[1:]  # noqa: E731
-RIGHT = {
-    "probe_constant": YES,
-    "probe_copy": REPEAT,
-    "probe_delayed": REPEAT,
-    "probe_survival": REPEAT,
-    "probe_curriculum": EXCLUSIVE_OR,
-    "probe_selection": MIDDLE,
+
+ANSWERS: dict[str, tuple[PolicyFn, float]] = {
+    "probe_constant": (YES, 1.0),
+    "probe_copy": (REPEAT, 1.0),
+    "probe_delayed": (REPEAT, 1.0),
+    "probe_survival": (REPEAT, 2.0),
+    "probe_curriculum": (EXCLUSIVE_OR, 1.0),
+    "probe_selection": (MIDDLE, 2.0),
 }
-BEST = {
-    "probe_constant": 1.0,
-    "probe_copy": 1.0,
-    "probe_delayed": 1.0,
-    "probe_survival": 2.0,
-    "probe_curriculum": 1.0,
-    "probe_selection": 2.0,
-}
+"""The right policy of each probe, and its fitness."""
 
 
 def _examine(probe: Probe, policy: PolicyFn, level: int = 0) -> Episode:
@@ -54,39 +46,14 @@ def _play(probe: Probe, observation: tuple[float, ...], actions: list[float]) ->
     return seen
 
 
-def test_the_probes_are_the_six_with_known_answers() -> None:
-    assert list(PROBES) == list(RIGHT) == list(BEST)
-    for name, probe in PROBES.items():
-        assert probe.name == name
-        assert probe.best_fitness == BEST[name]
-
-
-@pytest.mark.parametrize("name", RIGHT)
-def test_the_right_policy_succeeds_exactly_with_the_best_fitness_at_every_level(name: str) -> None:
-    for level in range(PROBES[name].levels):
-        episode = _examine(PROBES[name], RIGHT[name], level)
-        assert float(episode.success) == 1.0
-        assert float(episode.fitness) == BEST[name]
-
-
-@pytest.mark.parametrize("name", RIGHT)
-def test_the_wrong_policy_fails_exactly(name: str) -> None:
-    for level in range(PROBES[name].levels):
-        episode = _examine(PROBES[name], lambda observation: -RIGHT[name](observation), level)
-        assert float(episode.success) == 0.0
-        assert float(episode.fitness) == -1.0
-
-
-def test_the_constant_asks_for_yes_whatever_is_shown() -> None:
-    assert float(_examine(CONSTANT, REPEAT).success) == 0.5
-    assert float(_examine(CONSTANT, REPEAT).fitness) == 0.0
-    assert _play(CONSTANT, (0.0,), [1.0]) == [((0.0,), 1.0, True, False)]
-    assert _play(CONSTANT, (1.0,), [-1.0]) == [((1.0,), -1.0, True, False)]
-
-
-def test_an_answer_of_0_is_the_bit_0() -> None:
-    assert _play(COPY, (-1.0,), [0.0]) == [((-1.0,), 1.0, True, False)]
-    assert _play(COPY, (1.0,), [0.0]) == [((1.0,), -1.0, True, False)]
+@pytest.mark.parametrize("name", PROBES)
+def test_the_right_policy_succeeds_exactly_with_the_best_fitness_and_the_wrong_one_fails_exactly(name: str) -> None:
+    probe, (right, best) = PROBES[name], ANSWERS[name]
+    assert (probe.name, probe.best_fitness) == (name, best)
+    for level in range(probe.levels):
+        for policy, success, fitness in ((right, 1.0, best), (lambda observation: -right(observation), 0.0, -1.0)):
+            episode = _examine(probe, policy, level)
+            assert (float(episode.success), float(episode.fitness)) == (success, fitness)
 
 
 @pytest.mark.parametrize("bit", [-1.0, 1.0])
@@ -116,41 +83,3 @@ def test_selection_pays_nothing_for_right_answers_behind_a_wrong_one() -> None:
         assert float(_examine(SELECTION, policy).fitness) == -1.0
         assert float(_examine(SELECTION, policy).success) == 0.0
     assert float(_examine(SELECTION, YES).fitness) == pytest.approx((5 * 2 + 10 * 0) / 15)
-
-
-def test_the_curriculums_first_level_is_solved_by_what_its_second_is_not() -> None:
-    assert float(_examine(CURRICULUM, SECOND_BIT, 0).success) == 1.0
-    assert float(_examine(CURRICULUM, SECOND_BIT, 1).success) == 0.5
-
-
-@pytest.mark.parametrize("name", RIGHT)
-def test_episodes_start_on_every_case_of_the_level_alike_and_on_no_other(name: str) -> None:
-    probe = PROBES[name]
-    for level, cases in enumerate(probe.cases_at_level):
-        keys = jax.random.split(jax.random.key(level), 200 * cases)
-        states = jax.vmap(probe.reset, in_axes=(0, None))(keys, jnp.asarray(level, jnp.int32))
-        counts = np.bincount(np.asarray(states.inner.case))
-        assert len(counts) == cases
-        assert counts.min() > 0.7 * 200
-
-
-@pytest.mark.parametrize("name", RIGHT)
-@pytest.mark.parametrize("policy", [YES, REPEAT, lambda observation: -jnp.ones(1)], ids=["yes", "repeat", "no"])
-def test_the_examination_is_what_episodes_pay_on_average(name: str, policy: PolicyFn) -> None:
-    probe = PROBES[name]
-    level = jnp.asarray(probe.levels - 1, jnp.int32)
-    step = jax.jit(lambda state: probe.step(state, policy(state.observation)))
-    returns: dict[int, float] = {}
-    for key in jax.random.split(jax.random.key(0), 16 * probe.cases_at_level[-1]):
-        state = probe.reset(key, level)
-        case, total = int(state.inner.case), 0.0
-        if case in returns:
-            continue
-        while not (state.terminated or state.truncated):
-            state = step(state)
-            total += float(state.reward)
-        returns[case] = total
-    assert len(returns) == probe.cases_at_level[-1]
-    assert float(_examine(probe, policy, probe.levels - 1).fitness) == pytest.approx(np.mean(list(returns.values())))
-    trained = probe.episode(policy, jax.random.key(1), level)
-    assert float(trained.fitness) == float(_examine(probe, policy, probe.levels - 1).fitness)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any
 
@@ -15,8 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from kernel_functions import FUNCTIONS
 
-from evoclaims.envs.ecorobot.robots import ANT
-from evoclaims.envs.ecorobot.stones import SteppingStones
+from evoclaims.envs.ecorobot.locomotion import Locomotion
+from evoclaims.envs.ecorobot.robots import HOPPER
 from evoclaims.kernels.call.kernel import Kernel
 from evoclaims.kernels.emit import block_kernel
 from evoclaims.kernels.emit.block_kernel import BlockShape
@@ -65,18 +64,13 @@ def test_warps_compute_together_what_one_does(case: str, warps: int, teams: int)
 
 @pytest.mark.slow
 def test_warps_make_a_robots_step_together() -> None:
-    task = SteppingStones(robot=ANT)
+    task = Locomotion(robot=HOPPER)
     state = jax.vmap(task.reset, (0, None))(jax.random.split(jax.random.key(0), 3), jnp.int32(0))
     action = jax.random.uniform(jax.random.key(1), (3, task.action_size), minval=-1.0, maxval=1.0)
+    kernel = _kernel(task.plain_step, (state, action))
     for _ in range(20):  # until feet are on the ground
-        state = jax.vmap(task.step)(state, action)
-    places = jax.tree.map(lambda x: jnp.broadcast_to(x, (3, *jnp.shape(x))), task.numbers)
-    arguments = (state, action, places)
-
-    def step(state: Any, action: Any, places: Any) -> Any:
-        return task.with_numbers(places).plain_step(state, action)
-
-    _check(_kernel(step, arguments), [np.asarray(leaf) for leaf in jax.tree.leaves(arguments)], warps=4, teams=2)
+        state = jax.tree.unflatten(kernel.structure, kernel.on_host(*jax.tree.leaves((state, action))))
+    _check(kernel, [np.asarray(leaf) for leaf in jax.tree.leaves((state, action))], warps=4, teams=2)
 
 
 def test_a_loop_in_a_loop_is_left_to_one_warp() -> None:
@@ -146,10 +140,3 @@ def test_every_group_has_a_warp_and_no_warp_much_more_than_its_share(groups: lis
     for warp in range(warps):
         load = sum(group.instructions for group, w in zip(groups, warp_of, strict=True) if w == warp)
         assert load <= 3 * SLACK * total / warps + STRETCHES * largest
-
-
-def test_what_reads_one_another_stays_together() -> None:
-    chains = [Group(1, {} if at < 4 else {at - 4: at - 4}) for at in range(400)]  # four that have nothing in common
-    warp_of = assign(chains, 4)
-    apart = sum(warp_of[at] != warp_of[at - 4] for at in range(4, 400))
-    assert apart <= math.ceil(0.1 * 400)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable
 from typing import Any
 
@@ -15,7 +14,6 @@ from evoclaims.kernels.call.by_platform import BY_PLATFORM, by_platform
 
 X = np.random.default_rng(0).normal(size=(3, 4)).astype(np.float32)
 Y = np.random.default_rng(1).normal(size=(3, 4)).astype(np.float32)
-AXES = [axes for axes in itertools.product((0, 1, None), repeat=2) if axes != (None, None)]
 TWICE = [(0, 0), (1, 0), (0, None), (None, 1)]
 
 
@@ -66,17 +64,6 @@ def test_no_other_platform_traces_what_gpus_compute() -> None:
     _same(run(X, Y), _sine(X, Y))
     with pytest.raises(AssertionError, match="for nothing"):
         jax.jit(run).trace(X, Y).lower(lowering_platforms=("cuda",))
-
-
-@pytest.mark.parametrize("axes", AXES)
-def test_either_way_may_be_batched_along_any_axes(axes: tuple[int | None, int | None]) -> None:
-    x, y = (jnp.asarray(a).T if axis == 1 else jnp.asarray(a) for a, axis in zip((X, Y), axes, strict=True))
-    x, y = (a[0] if axis is None else a for a, axis in zip((x, y), axes, strict=True))
-    expected = jax.vmap(_sine, axes)(x, y)
-    run = jax.vmap(by_platform(_sine, _cosine), axes)
-    for made in (jax.jit(run)(x, y), run(x, y), _on_gpu(run, x, y)):
-        _same(made, expected)
-        assert jax.tree.map(jnp.shape, made) == jax.tree.map(jnp.shape, expected)
 
 
 @pytest.mark.parametrize("inner", TWICE)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-from fractions import Fraction
 from typing import Any
 
 import jax
@@ -17,20 +16,12 @@ from kernel_functions import FUNCTIONS, X
 from evoclaims.kernels.call.kernel import Kernel, one_kernel
 from evoclaims.kernels.emit.machine_code import lanes
 from evoclaims.kernels.trace import seldom as seldom_conditions
-from evoclaims.kernels.trace.algebra import Algebra
 from evoclaims.kernels.trace.expressions import (
-    FUSED,
-    Expression,
-    Input,
     LoopResult,
     ScalarOperation,
     in_order,
-    is_known,
 )
 from evoclaims.kernels.trace.seldom import seldom
-
-NUMBER = np.dtype(np.float32)
-SMALL_NUMBERS = st.integers(-64, 64).map(lambda n: np.float32(n / 4))
 
 
 def _kernel(function: Any, *arguments: Any) -> Kernel:
@@ -121,37 +112,3 @@ def test_a_seldom_condition_is_the_condition_elsewhere() -> None:
     assert seldom_conditions.SELDOM.name == "seldom"  # as `expressions.KNOWN` has it
     outside = one_kernel(lambda x: jnp.where(seldom(x > 0), x, -x), "This")  # of a loop
     np.testing.assert_array_equal(jax.vmap(outside)(X), np.abs(X))
-
-
-def _value(number: Any, values: dict[int, np.float32]) -> np.float32:
-    """Return what an expression of floats is, with sums and products rounded once."""
-    if is_known(number):
-        return number
-    if isinstance(number, Input):
-        return values[number.place]
-    assert isinstance(number, ScalarOperation)
-    exact = [Fraction(float(_value(o, values))) for o in number.operands]
-    c, a, b = exact if number.name in FUSED else (exact + [Fraction(0)] * 2)[:3]
-    result = {
-        "fma": c + a * b, "fms": a * b - c, "fnma": c - a * b,
-        "add": c + a, "sub": c - a, "mul": c * a, "neg": -c,
-    }[number.name]  # fmt: skip
-    return np.float32(float(result))
-
-
-@given(
-    name=st.sampled_from(FUSED),
-    known=st.lists(st.none() | st.sampled_from([0.0, 1.0, -1.0, 0.5]), min_size=3, max_size=3),
-    values=st.lists(SMALL_NUMBERS, min_size=3, max_size=3),
-)
-def test_fused_products_on_known_numbers_are_simpler_and_the_same(
-    name: str, known: list[float | None], values: list[np.float32]
-) -> None:
-    inputs: list[Expression] = [Input(NUMBER, 0, place) for place in range(3)]
-    given = [i if k is None else np.float32(k) for i, k in zip(inputs, known, strict=True)]
-    all_values = [v if k is None else np.float32(k) for v, k in zip(values, known, strict=True)]
-    operation = ScalarOperation(NUMBER, name, tuple(inputs))
-    made = Algebra().again(operation, given)
-    assert _value(made, dict(enumerate(values))) == _value(operation, dict(enumerate(all_values)))
-    if any(k in (0.0, 1.0, -1.0) for k in known[1:]):
-        assert is_known(made) or isinstance(made, Input) or made.name not in FUSED

@@ -35,7 +35,8 @@ class Entry:
         task: what the conformance tests train it on.
         cost: environment steps of one of its steps on `task`, worked out by hand.
         other: the method with other hyperparameters: at a size that solves every probe, if it is one that does.
-        curriculum: steps that the probe with two levels may take; 0 for a method that no probe is for.
+        curriculum: steps that the probe with two levels may take; 0 for a method that no probe is for, and for one that
+            climbs by another's code.
         selection: steps that the probe of selection may take; 0 for a method that breeds none of its policies.
         keeps_the_best: whether its best policy never gets worse on a deterministic task.
         learns: whether a step draws from its key and changes the numbers that the method goes on with.
@@ -90,7 +91,6 @@ METHODS = {
         task=NParity(3),
         cost=12 * 8,
         other=SeldomDecomposedCmaEs(256, network=AllSkips(8), replaced=0.1),
-        curriculum=200,
         selection=40,
     ),
     "neat": Entry(method=Neat(SMALL), task=NParity(3), cost=24 * 8, other=Neat(PROBING), curriculum=3000, selection=30),
@@ -99,7 +99,6 @@ METHODS = {
         task=NParity(3),
         cost=24 * 8,
         other=HyperNeat(replace(PROBING, activations=CPPN_FUNCTIONS), hidden=(8,), extent="unit"),
-        curriculum=3000,
         selection=300,
     ),
     "ppo": Entry(

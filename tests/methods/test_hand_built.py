@@ -34,6 +34,7 @@ def test_it_is_exactly_right_at_every_level_and_its_negation_exactly_wrong(
     task: Any, negated: bool, success: float, fitness: float
 ) -> None:
     method = HandBuilt(negated)
+    assert method.name == ("hand_built_negated" if negated else "hand_built")
     policy = method.best(task, method.init(jax.random.key(0), task))
     final = jax.jit(lambda key: examine_every_level(task, policy, key))(jax.random.key(0))
     np.testing.assert_array_equal(final.success, np.full(task.levels, success, np.float32))
@@ -53,17 +54,6 @@ def test_a_wrong_truth_table_does_not_make_it_wrong_alike() -> None:
     task = DeafParity(4)
     final = examine_every_level(task, HandBuilt().best(task, jax.numpy.int32(0)), jax.random.key(0))
     np.testing.assert_array_equal(final.success, [1.0, 1.0, 0.5])
-
-
-def test_a_step_tells_the_examination_and_counts() -> None:
-    task, method = NParity(3), HandBuilt()
-    state, progress = method.step(jax.random.key(1), task, jax.numpy.int32(1), method.init(jax.random.key(0), task))
-    assert (float(progress.success), bool(progress.healthy), int(state)) == (1.0, True, 1)
-    assert method.cost(task) == 8
-
-
-def test_the_network_and_its_negation_have_different_names() -> None:
-    assert (HandBuilt().name, HandBuilt(negated=True).name) == ("hand_built", "hand_built_negated")
 
 
 def test_a_task_without_a_truth_table_is_one_sentence() -> None:

@@ -11,8 +11,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from evoclaims.core.errors import UserError
@@ -46,7 +44,6 @@ ROBOT = Substrate(
     )
 )
 """Four sensors and the bias, hidden neurons, and four actuators, each where it points."""
-SUBSTRATES = pytest.mark.parametrize("substrate", [LAYERED, ROBOT], ids=["layered", "robot"])
 
 
 def _ask(genome: Genome, functions: Sequence[str], output: str, query: Sequence[float]) -> float:
@@ -128,13 +125,13 @@ DRAWING = np.random.default_rng(1)
 CPPNS = [_any_genome(DRAWING) for _ in range(60)]
 
 
-def _network(substrate: Substrate) -> SubstrateNetwork:
-    return SubstrateNetwork(substrate, GraphNetwork(4, 1, NAMES, "tanh"), threshold=0.3, max_weight=5.0)
-
-
-@SUBSTRATES
-def test_the_drawn_network_is_a_dense_one_with_the_weights_that_the_cppn_answers(substrate: Substrate) -> None:
-    network = _network(substrate)
+@pytest.mark.parametrize(
+    ("substrate", "threshold", "max_weight"), [(LAYERED, 0.3, 5.0), (ROBOT, 0.75, 2.0)], ids=["layered", "robot"]
+)
+def test_the_drawn_network_is_a_dense_one_with_the_weights_that_the_cppn_answers(
+    substrate: Substrate, threshold: float, max_weight: float
+) -> None:
+    network = SubstrateNetwork(substrate, GraphNetwork(4, 1, NAMES, "tanh"), threshold, max_weight)
     express, apply = jax.jit(network.express), jax.jit(network.apply)
     drawing = np.random.default_rng(0)
     kinds: set[str] = set()
@@ -151,101 +148,6 @@ def test_the_drawn_network_is_a_dense_one_with_the_weights_that_the_cppn_answers
         answer = apply(drawn, jnp.float32(observation))
         np.testing.assert_allclose(answer, signal, atol=1e-5)
     assert kinds == {"none", "positive", "negative"}
-
-
-def test_a_population_is_expressed_and_acts_as_its_genomes_do_one_by_one() -> None:
-    network = _network(LAYERED)
-    population = jax.tree.map(lambda *leaf: np.stack(leaf), *CPPNS)
-    together = jax.jit(jax.vmap(network.express))(population)
-    rows = jnp.asarray([[0.0, 1.0], [1.0, 1.0], [-0.5, 2.0]])
-    answers = jax.jit(jax.vmap(jax.vmap(network.apply, (None, 0)), (0, None)))(together, rows)
-    express = jax.jit(network.express)
-    for i, genome in enumerate(CPPNS):
-        alone = express(genome)
-        for matrix, one in zip(together, alone, strict=True):
-            np.testing.assert_allclose(matrix[i], one, atol=1e-5)
-        for row, answer in zip(rows, answers[i], strict=True):
-            np.testing.assert_allclose(answer, network.apply(alone, row), atol=1e-5)
-
-
-def _answering(weights: Sequence[float], bias: float = 0.0) -> Genome:
-    """Return a CPPN without hidden nodes: z = bias + Σ weights · (x₁, y₁, x₂, y₂)."""
-    return Genome(
-        nodes=Nodes(
-            key=jnp.array([0, 1, 2, 3, 4, EMPTY], jnp.int32),
-            bias=jnp.zeros(6).at[4].set(bias),
-            response=jnp.ones(6),
-            activation=jnp.zeros(6, jnp.int32),
-        ),
-        connections=Connections(
-            source=jnp.arange(4, dtype=jnp.int32),
-            target=jnp.full(4, 4, jnp.int32),
-            weight=jnp.asarray(weights, jnp.float32),
-        ),
-        node_count=jnp.asarray(5, jnp.int32),
-        connection_count=jnp.asarray(4, jnp.int32),
-    )
-
-
-def test_a_weight_leads_from_the_first_place_that_is_asked_about_to_the_second() -> None:
-    substrate = Substrate((((0.1, 0.2), (0.3, 0.4), (0.5, 0.6)), ((0.7, 0.8), (0.9, 1.0)), ((0.15, 0.25),)))
-    network = SubstrateNetwork(substrate, GraphNetwork(4, 1, ("tanh",), "identity"), threshold=0.0, max_weight=1.0)
-    for coordinate, wanted in enumerate(
-        [
-            ([[0.1, 0.3, 0.5]] * 2, [[0.7, 0.9]]),
-            ([[0.2, 0.4, 0.6]] * 2, [[0.8, 1.0]]),
-            ([[0.7] * 3, [0.9] * 3], [[0.15] * 2]),
-            ([[0.8] * 3, [1.0] * 3], [[0.25] * 2]),
-        ]
-    ):
-        drawn = network.express(_answering(np.eye(4)[coordinate].tolist()))
-        for matrix, wanted_matrix in zip(drawn, wanted, strict=True):
-            np.testing.assert_allclose(matrix, wanted_matrix, rtol=1e-6)
-
-
-PAIR = Substrate((((0.0, 0.0),), ((0.0, 0.0),)))
-WEIGHING = {
-    sizes: jax.jit(SubstrateNetwork(PAIR, GraphNetwork(4, 1, ("tanh",), "identity"), *sizes).express)
-    for sizes in ((0.3, 5.0), (0.0, 1.0), (0.75, 2.0))
-}
-
-
-def _weigh(sizes: tuple[float, float], q: float) -> float:
-    """Return the weight for a CPPN that answers q, whatever it is asked."""
-    ((weight,),) = WEIGHING[sizes](_answering([0.0] * 4, bias=q))[0].tolist()
-    return float(weight)
-
-
-@given(q=st.floats(-1, 1, width=32), other=st.floats(-1, 1, width=32), sizes=st.sampled_from(list(WEIGHING)))
-@settings(deadline=None)
-def test_a_weight_grows_with_q_from_0_at_the_threshold_to_the_largest_at_1(
-    q: float, other: float, sizes: tuple[float, float]
-) -> None:
-    threshold, largest = sizes
-    weight = _weigh(sizes, q)
-    np.testing.assert_allclose(weight, _weight(q, threshold, largest), atol=1e-5)
-    assert _weigh(sizes, -q) == -weight
-    assert abs(weight) <= largest * (1 + 1e-6)
-    if abs(q) < np.float32(threshold):
-        assert weight == 0.0
-    assert (q - other) * (weight - _weigh(sizes, other)) >= 0
-
-
-def test_a_one_for_the_bias_is_appended_to_the_observation_and_to_nothing_else() -> None:
-    network = _network(layered((3, 2, 1)))
-    hidden, output = jnp.array([[0.5, -1.0, 0.25], [0.0, 0.0, 0.0]]), jnp.array([[2.0, 3.0]])
-    (answer,) = network.apply([hidden, output], jnp.array([0.3, 0.8])).tolist()
-    # The second hidden neuron hears nothing, and emits tanh(0) = 0.
-    assert answer == pytest.approx(np.tanh(2.0 * np.tanh(0.5 * 0.3 - 0.8 + 0.25)), abs=1e-6)
-    assert network.apply([jnp.zeros((2, 3)), output], jnp.array([0.3, 0.8])).tolist() == [0.0]
-
-
-def test_a_cppn_whose_output_nothing_feeds_draws_no_connection() -> None:
-    fed = _answering([1.0] * 4, bias=0.9)
-    unfed = replace(fed, connection_count=jnp.asarray(0, jnp.int32))
-    network = _network(LAYERED)
-    assert any(np.any(np.asarray(matrix) != 0) for matrix in network.express(fed))
-    assert all(np.all(np.asarray(matrix) == 0) for matrix in network.express(unfed))
 
 
 def test_layers_are_the_observation_and_the_bias_then_the_hidden_ones_then_the_actions() -> None:
@@ -273,10 +175,6 @@ def test_the_best_policy_is_the_drawn_network_of_the_champion() -> None:
         signal = np.tanh(matrix @ signal)
     np.testing.assert_allclose(policy(jnp.array([0.25, -0.5])), signal, atol=1e-5)
     assert np.all(np.abs(signal) > 1e-3), "the network draws nothing"
-
-
-def test_the_cost_counts_every_row_of_every_genome() -> None:
-    assert HyperNeat(replace(PAPER, population=200)).cost(NParity(3)) == 200 * 8
 
 
 def test_the_papers_and_the_published_codes_values() -> None:

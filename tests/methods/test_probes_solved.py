@@ -9,7 +9,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import pytest
-from probes import COPY, CURRICULUM, PROBES, SELECTION, Probe
+from probes import CONSTANT, COPY, CURRICULUM, PROBES, SELECTION, Probe
 from small_methods import METHODS, Entry
 
 from evoclaims.envs.base import Episode, PolicyFn
@@ -29,15 +29,15 @@ AT_ONCE = 10
 def _steps(name: str, probe: Probe) -> int:
     """Return the steps that a method may take to solve a probe; 0 where it is not held to it.
 
-    When rewards are paid is the affair of the task for methods that see the fitness of whole episodes alone, and one
-    of them stands for all. `SELECTION` asks more of methods that select than `COPY`.
+    `SELECTION` asks more of methods that select than `COPY`, and `COPY` more than `CONSTANT`. When rewards are paid is
+    the affair of the task for methods that see the fitness of whole episodes alone.
     """
     entry = METHODS[name]
     if probe == SELECTION:
         return entry.selection
     if probe == CURRICULUM:
         return entry.curriculum
-    held = not entry.selection if probe == COPY else entry.sees_rewards or name == "cma_es"
+    held = not entry.selection if probe == COPY else entry.sees_rewards and probe != CONSTANT
     return AT_ONCE if entry.curriculum and held else 0
 
 

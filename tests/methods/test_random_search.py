@@ -1,4 +1,4 @@
-"""Random search is the best of all that it has drawn."""
+"""Random search is the best of all that it has drawn; the random policy is a draw."""
 
 from __future__ import annotations
 
@@ -13,8 +13,11 @@ from workbench import Workbench
 
 from evoclaims.core.errors import UserError
 from evoclaims.core.keys import stream
+from evoclaims.envs.gates.parity import NParity
+from evoclaims.methods.random_policy import RandomPolicy
 from evoclaims.methods.random_search import RandomSearch
 from evoclaims.networks.all_skips import AllSkips
+from evoclaims.networks.mlp import Mlp
 
 STEPS, SEED = 6, 2
 
@@ -63,6 +66,14 @@ def test_the_standard_deviation_scales_what_is_drawn() -> None:
         drawn[std] = Workbench(method, task).run(1)[0]
     np.testing.assert_allclose(drawn[3.0].parameters, 3.0 * drawn[1.0].parameters, rtol=1e-6)
     assert float(np.abs(drawn[1.0].parameters).max()) > 0
+
+
+def test_a_random_policy_s_parameters_are_standard_normal_and_differ_between_seeds() -> None:
+    method = RandomPolicy(Mlp((64,) * 2))
+    draws = np.stack([method.init(jax.random.key(seed), NParity(3)).parameters for seed in range(4)])
+    assert len(np.unique(draws[:, 0])) == 4
+    assert abs(draws.mean()) < 0.05
+    assert abs(draws.std() - 1) < 0.05
 
 
 @pytest.mark.parametrize("wrong", [{"population": 0}, *({"std": wrong} for wrong in (0.0, -1.0, math.inf, math.nan))])

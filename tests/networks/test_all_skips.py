@@ -11,8 +11,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from evoclaims.core.errors import UserError
@@ -62,32 +60,8 @@ def test_it_computes_what_loops_over_neurons_compute(inputs: int, hidden: int, o
         np.testing.assert_allclose(answer, _loops(parameters, observation, hidden, outputs), atol=1e-5)
 
 
-@sizes
-def test_it_has_one_parameter_for_every_connection_and_bias(inputs: int, hidden: int, outputs: int) -> None:
-    into_hidden = sum(inputs + 1 + neuron for neuron in range(hidden))
-    into_outputs = outputs * (inputs + 1 + hidden)
-    assert AllSkips(hidden).size(inputs, outputs) == into_hidden + into_outputs
-
-
 def test_the_papers_network_on_6_parity_has_475_parameters() -> None:
     assert AllSkips(24).size(6, 1) == 24 * 7 + 24 * 23 // 2 + 7 + 24
-
-
-@st.composite
-def _networks(draw: st.DrawFn) -> tuple[int, int, NDArray[np.float64], NDArray[np.float64]]:
-    """Draw hidden neurons, outputs, parameters and an observation."""
-    inputs, hidden, outputs = draw(st.integers(1, 4)), draw(st.integers(0, 6)), draw(st.integers(1, 3))
-    return hidden, outputs, *_drawn(inputs, hidden, outputs, draw(st.integers(0, 2**31 - 1)))
-
-
-@settings(max_examples=8, deadline=None)
-@given(_networks())
-def test_without_its_loop_it_computes_the_same(network: Any) -> None:
-    hidden, outputs, parameters, observation = network
-    given_ = jnp.float32(parameters), jnp.float32(observation)
-    answer = jax.jit(partial(unrolled, hidden, outputs))(*given_)
-    assert (answer.shape, answer.dtype) == ((outputs,), jnp.float32)
-    np.testing.assert_allclose(answer, _apply(hidden, outputs)(*given_), atol=1e-5)
 
 
 def _in_a_loop(function: Any, parameters: Any, observation: Any) -> Any:
@@ -123,7 +97,7 @@ def _batches(inputs: int, hidden: int, outputs: int, case: str) -> tuple[jax.Arr
 
 
 @pytest.mark.parametrize("case", BATCHED)
-@pytest.mark.parametrize(("inputs", "hidden", "outputs"), [(1, 0, 1), (2, 1, 2), (3, 2, 1), (6, 24, 2)])
+@pytest.mark.parametrize(("inputs", "hidden", "outputs"), [(1, 0, 1), (3, 2, 1), (6, 24, 2)])
 def test_batched_and_in_loops_every_way_computes_the_same(inputs: int, hidden: int, outputs: int, case: str) -> None:
     network, loop, other = (jax.jit(way) for way in _ways(hidden, outputs, BATCHED[case]))
     given_ = _batches(inputs, hidden, outputs, case)

@@ -31,18 +31,6 @@ def _genome() -> Genome:
     )
 
 
-def test_places_within_the_counts_hold_genes() -> None:
-    genome = _genome()
-    assert np.asarray(genome.has_node).tolist() == [True] * 5 + [False] * 2
-    assert np.asarray(genome.has_connection).tolist() == [True] * 3 + [False]
-
-
-def test_outputs_are_found_wherever_they_lie() -> None:
-    slots = _genome().slots_of_outputs(2, 2)
-    assert np.asarray(slots).tolist() == [4, 3]
-    assert slots.dtype == jnp.int32
-
-
 def _plain(genome: Genome) -> list[Any]:
     return [np.asarray(leaf).tolist() for leaf in jax.tree.leaves(genome)]
 

@@ -17,6 +17,7 @@ from block_machine import run
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from evoclaims.core.errors import UnknownNameError
 from evoclaims.kernels.call import grouped
 from evoclaims.kernels.emit import group_kernel, machine_code
 from evoclaims.kernels.emit.gpu_kernel import GpuProgram
@@ -256,6 +257,12 @@ def test_nvidias_assembler_takes_the_kernels(own: int | None, tmp_path: Path) ->
     for text in texts:
         assert re.search(r"\.visible \.entry the_forward_pass_of_genomes\(", text)
         assemble(text, tmp_path)
+
+
+@pytest.mark.parametrize("names", [{"activations": ("tanh", "step")}, {"output": "step"}])
+def test_an_unknown_function_is_one_sentence(names: dict[str, Any]) -> None:
+    with pytest.raises(UnknownNameError, match="step"):
+        GraphNetwork(1, 1, **names)
 
 
 def test_lanes_are_as_many_as_rows_need() -> None:

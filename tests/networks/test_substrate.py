@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import pytest
@@ -15,20 +17,6 @@ from evoclaims.networks.substrate import Extent, Substrate, layered, on_circle
 
 extents = st.sampled_from(["largest_layer", "unit"])
 layer_widths = st.lists(st.integers(1, 9), min_size=2, max_size=4)
-
-
-def test_a_layered_substrate_by_hand() -> None:
-    inputs, hidden, outputs = layered((3, 2, 1), "unit").layers
-    assert inputs == ((-1.0, -1.0), (0.0, -1.0), (1.0, -1.0))
-    assert hidden == ((-1.0, 0.0), (1.0, 0.0))
-    assert outputs == ((0.0, 1.0),)
-
-
-def test_by_default_coordinates_run_to_the_width_of_the_largest_layer() -> None:
-    inputs, hidden, outputs = layered((2, 5, 1)).layers
-    assert inputs == ((-5.0, -5.0), (5.0, -5.0))
-    assert hidden == ((-5.0, 0.0), (-2.5, 0.0), (0.0, 0.0), (2.5, 0.0), (5.0, 0.0))
-    assert outputs == ((0.0, 5.0),)
 
 
 @given(widths=layer_widths, extent=extents)
@@ -61,15 +49,6 @@ def test_queries_are_the_places_of_source_and_target_in_the_order_of_the_weights
     ]
 
 
-@given(widths=layer_widths, extent=extents)
-def test_every_pair_of_neighbouring_layers_is_asked_for_once(widths: list[int], extent: Extent) -> None:
-    substrate = layered(widths, extent)
-    queries = substrate.queries
-    assert queries.shape == (sum(to * fro for to, fro in substrate.shapes), 4)
-    assert len(np.unique(queries, axis=0)) == len(queries)
-    assert (queries[:, 1] < queries[:, 3]).all()
-
-
 def test_sensors_that_point_in_the_four_directions_lie_there() -> None:
     quarters = [0.0, math.pi / 2, math.pi, 3 * math.pi / 2]
     np.testing.assert_allclose(on_circle(quarters, 0.5), [(0.5, 0), (0, 0.5), (-0.5, 0), (0, -0.5)], atol=1e-12)
@@ -83,24 +62,24 @@ def test_a_substrate_is_told_apart_by_its_places_alone() -> None:
     assert canonical_json(one) != canonical_json(other)
 
 
-@pytest.mark.parametrize("widths", [(), (3,), (3, 0, 1), (3, -1)])
-def test_widths_that_are_no_network_are_one_sentence(widths: tuple[int, ...]) -> None:
-    with pytest.raises(UserError, match="at least two layers of at least one neuron each"):
-        layered(widths)
+FIRST: tuple[tuple[float, float], ...] = ((0.0, 0.0),)
 
 
-def test_an_unknown_extent_is_told_with_the_known_ones() -> None:
-    with pytest.raises(UserError, match=r"'half'.*largest_layer, unit"):
-        layered((3, 1), "half")  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize("layers", [(), (((0.0, 0.0),),), (((0.0, 0.0),), ()), (((0.0, 0.0),), (), ((1.0, 1.0),))])
-def test_neurons_placed_by_hand_need_two_layers_and_none_empty(layers: tuple[tuple[tuple[float, float], ...]]) -> None:
-    with pytest.raises(UserError, match="a layer of inputs and one of outputs, and no empty layer"):
-        Substrate(layers)
-
-
-@pytest.mark.parametrize("point", [(0.0,), (0.0, 1.0, 2.0), (math.nan, 0.0), (0.0, math.inf)])
-def test_a_place_that_is_no_point_of_the_plane_is_told(point: tuple[float, ...]) -> None:
-    with pytest.raises(UserError, match=r"two finite coordinates"):
-        Substrate((((0.0, 0.0), point), ((1.0, 1.0),)))  # type: ignore[arg-type]
+@pytest.mark.parametrize(
+    ("build", "sentence"),
+    [
+        *((partial(layered, widths), "at least two layers") for widths in ((), (3,), (3, 0, 1), (3, -1))),
+        (partial(layered, (3, 1), "half"), r"'half'.*largest_layer, unit"),
+        *(
+            (partial(Substrate, layers), "a layer of inputs and one of outputs, and no empty layer")
+            for layers in ((), (FIRST,), (FIRST, ()), (FIRST, (), ((1.0, 1.0),)))
+        ),
+        *(
+            (partial(Substrate, ((*FIRST, point), FIRST)), "two finite coordinates")
+            for point in ((0.0,), (0.0, 1.0, 2.0), (math.nan, 0.0), (0.0, math.inf))
+        ),
+    ],
+)
+def test_what_is_no_substrate_is_one_sentence(build: Callable[[], Substrate], sentence: str) -> None:
+    with pytest.raises(UserError, match=sentence):
+        build()

@@ -128,7 +128,6 @@ class CmaEs:
 
     @property
     def _algorithm(self) -> Callable[..., Any]:
-        """Return what makes the search."""
         algorithm: Callable[..., Any] = evosax.CMA_ES
         return algorithm
 

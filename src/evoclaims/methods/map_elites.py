@@ -228,7 +228,6 @@ class MapElites:
         return episodes
 
     def _progress(self, task: Task, state: MapElitesState, healthy: Bool[Array, ""]) -> Progress:
-        """Report the best elite and the archive."""
         archive, fitnesses = state.archive, self.fitness_map(state)
         elite = jnp.argmax(archive.fitnesses)
         filled = fitnesses > -jnp.inf

@@ -217,7 +217,6 @@ class Ppo:
         )
 
     def _act(self, task: Task, state: PpoState) -> Act:
-        """Return the stochastic policy."""
         act = networks.make_inference_fn(self._networks(task))((state.statistics, state.networks.policy))
 
         def function(observation: Array, key: Array) -> tuple[Array, Any]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -22,11 +21,6 @@ from evoclaims.networks import Mlp
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.runner import warn_of_edited_bodies
 from evoclaims.trials.spec import Budget, Condition
-
-
-@pytest.fixture
-def texts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Texts:
-    return Texts(tmp_path, monkeypatch)
 
 
 def _condition(robot: Robot) -> Condition:

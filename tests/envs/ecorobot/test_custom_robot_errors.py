@@ -34,11 +34,6 @@ SLED = """
 """
 
 
-@pytest.fixture
-def texts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Texts:
-    return Texts(tmp_path, monkeypatch)
-
-
 @pytest.mark.parametrize(
     "numbers",
     [
@@ -119,6 +114,7 @@ def test_a_built_in_robot_s_start_is_checked_with_its_task() -> None:
             "has motion-capture bodies, which is not simulated",
         ),
         (("<option", '<option integrator="implicit"'), "another integrator than Euler or RK4, which is not"),
+        (("<option", '<option cone="elliptic"'), "elliptic friction cones, which is not"),
         (("<option", '<option solver="CG"'), "has another solver than Newton's, which is not"),
         (("<option", '<option noslip_iterations="3"'), "has noslip_iterations=3, which is not"),
         (
@@ -130,6 +126,10 @@ def test_a_built_in_robot_s_start_is_checked_with_its_task() -> None:
             "has the flag override=enable, which",
         ),
         (('type="sphere" size', 'type="sphere" fluidshape="ellipsoid" size'), "ellipsoids in a fluid"),
+        (("motor name", 'general dyntype="filter" name'), "actuators with a state, which"),
+        (("</mujoco>", '<equality><joint joint1="x" joint2="y"/></equality></mujoco>'), "equality constraints, which"),
+        (("</mujoco>", '<tendon><fixed><joint joint="x" coef="1"/></fixed></tendon></mujoco>'), "tendons, which"),
+        (('axis="0 1 0"', 'axis="0 1 0" frictionloss="0.1"'), "friction loss in joints, which"),
         (('gear="10"', 'gear="10" delay="0.1" nsample="20"'), "has actuators with a delay, which"),
         (('name="y" type="slide"', 'name="y" type="slide" damping="0.1 0.5"'), "has damping that is not linear, which"),
         (
@@ -148,6 +148,12 @@ def test_a_model_that_cannot_be_simulated_is_refused(change: tuple[str, str], se
 def test_a_model_without_a_body_is_refused(texts: Texts) -> None:
     with pytest.raises(UserError, match="has no torso: it has no body"):
         texts.robot('<mujoco><worldbody><geom type="plane" size="1 1 1"/></worldbody></mujoco>')
+
+
+def test_a_floor_that_would_count_as_a_box_is_refused(texts: Texts) -> None:
+    robot = texts.robot(SLED.replace('size="9 9 1"', 'size="9 9 1" group="1"'))
+    with pytest.raises(UserError, match="has a geom of the world in group 1, which is the group of a task's boxes"):
+        _ = Scene(robot).model
 
 
 @pytest.mark.parametrize("kind", ["capsule", "cylinder", "ellipsoid", "box"])

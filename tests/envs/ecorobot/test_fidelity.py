@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import jax
+import numpy as np
 import pytest
 from custom_robots import BASE, Texts
 
@@ -38,33 +39,51 @@ SLIDER = """
 """A ball that cannot leave its height."""
 
 
-def test_a_step_that_differs_by_a_millionth_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    scene = Scene(Texts(tmp_path, monkeypatch).robot(BASE), ())
+MANY_ATTRIBUTES = {
+    "<option": '<option viscosity="0.37" wind="0.1 0.2 0.3"',
+    '<body pos="0.3 0 0"': '<body pos="0.3 0 0" gravcomp="0.37"',
+    'axis="0 1 0"': 'axis="0 1 0" ref="0.37" springref="0.37"',
+    'type="capsule"': 'type="capsule" solmix="2"',
+    '<general name="motor" joint="knee" ctrlrange="-1 1" gainprm="3"/>': '<position joint="knee" kp="3" kv="0.37"/>',
+}
+
+
+@pytest.mark.parametrize("integrator", ["Euler", "RK4"])
+def test_attributes_of_a_file_move_a_robot_as_in_c(integrator: str, texts: Texts) -> None:
+    text = BASE.replace("<option", f'<option integrator="{integrator}"')
+    for plain, more in MANY_ATTRIBUTES.items():
+        assert text.count(plain) == 1
+        text = text.replace(plain, more)
+    off, *_ = fidelity._differences(Scene(texts.robot(text, frames=1, contacts=12)))
+    assert np.max(off) < 1e-9
+
+
+def test_a_step_that_differs_by_a_millionth_is_refused(texts: Texts, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = Scene(texts.robot(BASE), ())
     check(scene)
     monkeypatch.setattr(physics, "_frame", _off_by_a_millionth(physics._frame))
     with pytest.raises(UserError, match="rover is not simulated as its file says. In .* random states a frame"):
         check(scene)
 
 
-def test_contact_at_distance_zero_is_refused_naming_geoms(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_contact_at_distance_zero_is_refused_naming_geoms(texts: Texts) -> None:
     """As Gymnasium's point: it slides on the floor, and MuJoCo in C itself goes elsewhere by rounding errors."""
     text = SLIDER.format(height=0.1)
     with pytest.raises(UserError, match="decided by rounding errors there, since the geoms floor and ball are exactly"):
-        check(Scene(Texts(tmp_path, monkeypatch).robot(text)))
+        check(Scene(texts.robot(text)))
 
 
-def test_a_solver_that_stops_early_is_refused_naming_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    texts = Texts(tmp_path, monkeypatch)
+def test_a_solver_that_stops_early_is_refused_naming_it(texts: Texts) -> None:
     loose = SLIDER.format(height=0.0999)
     with pytest.raises(UserError, match=r"stops before the minimum there \(tolerance=1e-08\)"):
         check(Scene(texts.robot(loose)))
     check(Scene(texts.robot(loose.replace('timestep="0.02"', 'timestep="0.02" tolerance="1e-14"'))))
 
 
-def test_a_robot_is_checked_once_a_machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_robot_is_checked_once_a_machine(texts: Texts, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     checked: list[Scene] = []
     monkeypatch.setattr(fidelity, "check", checked.append)
-    texts, cache = Texts(tmp_path, monkeypatch), tmp_path / "cache"
+    cache = tmp_path / "cache"
 
     def checks(scene: Scene) -> int:
         require_fidelity.cache_clear()
@@ -109,12 +128,14 @@ def test_our_robots_are_checked_when_a_step_is_traced(tmp_path: Path, monkeypatc
     assert checked == [Scene(task.robot, ())]
 
 
-def test_a_robot_that_is_refused_is_checked_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_robot_that_is_refused_is_checked_again(
+    texts: Texts, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def refuse(scene: Scene) -> None:
         raise UserError("refused")
 
     monkeypatch.setattr(fidelity, "check", refuse)
-    task = Locomotion(robot=Texts(tmp_path, monkeypatch).robot(BASE))
+    task = Locomotion(robot=texts.robot(BASE))
     with _cached_in(tmp_path / "cache"):
         for _ in range(2):
             with pytest.raises(UserError, match="refused"):

@@ -12,13 +12,15 @@ import jax
 import jax.numpy as jnp
 import pytest
 
+from evoclaims.core.foreign import implicit_promotions
 from evoclaims.envs.ecorobot.locomotion import FurthestRun, Locomotion, Obstacles
 from evoclaims.envs.ecorobot.pose import Pose
 from evoclaims.envs.ecorobot.robots import ANT, HOPPER, HUMANOID, ROBOTS, WALKER2D, Robot
+from evoclaims.envs.foreign.brax_task import BraxTask
 
 pytestmark = pytest.mark.newest
 
-BRAX = {"ant": "Ant", "half_cheetah": "Halfcheetah", "hopper": "Hopper", "humanoid": "Humanoid", "walker2d": "Walker2d"}
+BRAX = ("ant", "half_cheetah", "hopper", "humanoid", "walker2d")
 
 
 def _pose(x: float, z: float = 1.2, pitch: float = 0.0) -> Pose:
@@ -31,12 +33,8 @@ def _pose(x: float, z: float = 1.2, pitch: float = 0.0) -> Pose:
 @cache
 def _brax(name: str) -> Any:
     """Return Brax's environment of a robot."""
-    from brax.envs import ant, half_cheetah, hopper, humanoid, walker2d
-
-    modules = (ant, half_cheetah, hopper, humanoid, walker2d)
-    module = {m.__name__.rpartition(".")[2]: m for m in modules}[name]
-    with jax.numpy_dtype_promotion("standard"), jax.numpy_rank_promotion("allow"), jax.debug_key_reuse(False):
-        return getattr(module, BRAX[name])(backend="mjx")
+    with implicit_promotions():
+        return BraxTask(name.replace("_", ""), {"backend": "mjx"}).make()
 
 
 @pytest.mark.filterwarnings("ignore:Brax System:UserWarning", "ignore:compiler attribute 'settotalmass':UserWarning")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 
 from evoclaims.envs.ecorobot.deceptive import DeceptiveMaze
 from evoclaims.envs.ecorobot.maze import CELLS, FINE
-from evoclaims.envs.ecorobot.robots import ANT, SIMPLE_ROB
+from evoclaims.envs.ecorobot.robots import ANT
 from evoclaims.envs.ecorobot.stones import STONES, SteppingStones
 
 MAZES: dict[str, Any] = {
@@ -81,15 +80,6 @@ def test_every_stone_lies_in_a_reachable_cell_and_walls_do_not() -> None:
         assert ground[int((x + 4) / 8 * 50), int(y / 7 * 50)]
     assert not ground[25, 0]  # the south wall
     assert not ground[int(1.5 / 8 * 50), int(4.91 / 7 * 50)]  # in the middle of wall 4, at 10°
-
-
-def test_a_wall_from_side_to_side_cuts_off_what_is_behind_it() -> None:
-    # The easy maze, with a robot so wide that the trap's open end, 4.7 m, lets it through no more.
-    wide = DeceptiveMaze(robot=replace(SIMPLE_ROB, torso_radius=2.4))
-    ground = wide.reachable()
-    assert not ground[:, int(7.5 / 11.5 * 50) :].any()
-    assert ground.any()
-    assert MAZES["easy"].reachable()[:, int(7.5 / 11.5 * 50) + 4 :].any()
 
 
 @pytest.mark.parametrize("name", MAZES)

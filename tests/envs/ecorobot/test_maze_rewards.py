@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from evoclaims.envs.ecorobot.deceptive import DIFFICULT, EASY, DeceptiveMaze
 from evoclaims.envs.ecorobot.pose import Pose
 from evoclaims.envs.ecorobot.robot_task import Ruling
-from evoclaims.envs.ecorobot.stones import ARENA, STONES, SteppingStones, StonesCrossed
+from evoclaims.envs.ecorobot.stones import STONES, SteppingStones, StonesCrossed
 
 TASK = SteppingStones()
 NO_ACTION = jnp.zeros(4)
@@ -54,12 +54,6 @@ def test_a_step_pays_the_stones_so_far_and_nearness_to_the_next() -> None:
     ruling = _stones_rule(2, 0.0, 0.5)
     assert float(ruling.reward) == pytest.approx(2 + 1 - math.hypot(3.2, 2.0) / (8 * math.sqrt(2)))
     assert not ruling.ended
-
-
-def test_crossing_a_stone_turns_to_the_one_after_it() -> None:
-    (x, y), (following_x, following_y) = STONES[0], STONES[1]
-    expected = 1 + 1 - math.hypot(following_x - x, following_y - y) / ARENA
-    assert float(_stones_rule(0, x, y).reward) == pytest.approx(expected)
 
 
 def test_the_target_pays_a_thousand_once_all_other_stones_are_crossed() -> None:

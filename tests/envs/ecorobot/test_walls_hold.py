@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from plain_mujoco import quickly_compiled
 
+from evoclaims.envs.base import TaskState
 from evoclaims.envs.ecorobot import physics
 from evoclaims.envs.ecorobot.physics import Body
 from evoclaims.envs.ecorobot.stones import SteppingStones
@@ -39,15 +41,17 @@ def test_a_thousand_robots_at_full_force_run_into_walls_and_never_through_one() 
     # Motors at their limit: 2 N along both axes, or along one.
     pushes = (random.random((STEPS // KEPT, ROBOTS, 4)) < 0.5).astype(np.float32).repeat(KEPT, axis=0)
 
-    def move(bodies: Body, controls: jax.Array) -> tuple[Body, tuple[jax.Array, jax.Array]]:
-        after = jax.vmap(lambda body, control: physics.act(TASK.scene, body, control, TASK.numbers))(bodies, controls)
-        return after, (after.position, after.velocity)
+    def move(states: TaskState, actions: jax.Array) -> tuple[TaskState, Body]:
+        after = jax.vmap(TASK.step)(states, actions)
+        return after, after.inner.body
 
     at = jnp.asarray(np.pad(starts, ((0, 0), (0, 1))), jnp.float32)
+    states = jax.vmap(TASK.reset, (0, None))(jax.random.split(jax.random.key(0), ROBOTS), jnp.int32(0))
     bodies = jax.vmap(physics.resting)(at, jnp.zeros((ROBOTS, 3)))
-    positions, velocities = quickly_compiled(lambda b: jax.lax.scan(move, b, jnp.asarray(pushes)))(bodies)[1]
-    places = np.asarray(positions, np.float64)[..., :2]
-    speeds = np.linalg.norm(np.asarray(velocities)[..., :2], axis=-1)
+    states = replace(states, inner=replace(states.inner, body=bodies))
+    bodies = jax.jit(lambda s: jax.lax.scan(move, s, jnp.asarray(pushes))[1])(states)
+    places = np.asarray(bodies.position, np.float64)[..., :2]
+    speeds = np.linalg.norm(np.asarray(bodies.velocity)[..., :2], axis=-1)
     gaps = _gaps(places)
     assert np.mean(gaps.min(axis=0) < TASK.robot.torso_radius) > 0.8
     assert np.mean(speeds.max(axis=0) > 1.4) > 0.5

@@ -21,8 +21,6 @@ from evoclaims.envs.foreign.gymnax_task import GymnaxTask
 from evoclaims.envs.foreign.jax_task import Choice, Descriptor, Moment, Range, actions_of
 from evoclaims.methods.cma_es import CmaEs
 from evoclaims.methods.map_elites import MapElites
-from evoclaims.methods.neat.evolution import Neat
-from evoclaims.methods.neat.settings import Settings, Species
 from evoclaims.methods.ppo import Ppo
 from evoclaims.methods.random_search import RandomSearch
 from evoclaims.networks.mlp import Mlp
@@ -38,12 +36,8 @@ SMALL = Mlp((2,))
 CART = GymnaxTask("CartPole-v1", episode_steps=200, solved_at=60, examined_episodes=3)
 FAST = BraxTask("fast", episode_steps=12, examined_episodes=2, solved_at=0.0)
 ALONG = Descriptor(places=(0, 1), area=((-5, 5), (-5, 5)))
-METHODS = {
-    "cma_es": CmaEs(population=4, network=SMALL),
-    "map_elites": MapElites(network=SMALL, batch=4, cells=(3, 3), initial=4),
-    "ppo": Ppo(policy_layers=(2,), value_layers=(2,), environments=4, batch_size=4, minibatches=1, unroll_length=2),
-    "neat": Neat(Settings(population=8, nodes=12, connections=24, species=Species(most=2))),
-}
+MAPPED = MapElites(network=SMALL, batch=4, cells=(3, 3), initial=4)
+STEPPED = Ppo(policy_layers=(2,), value_layers=(2,), environments=4, batch_size=4, minibatches=1, unroll_length=2)
 
 
 def one_trial(method: Any, task: Any, folder: Path, generations: int = 2) -> TrialResult:
@@ -53,20 +47,13 @@ def one_trial(method: Any, task: Any, folder: Path, generations: int = 2) -> Tri
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", METHODS)
-def test_every_method_fits_an_environment_of_brax(name: str) -> None:
-    traced_progress(METHODS[name], BraxTask("fast", episode_steps=12, descriptor=ALONG))
-
-
-@with_gymnax
-@pytest.mark.slow
-@pytest.mark.parametrize("name", METHODS)
-def test_every_method_fits_an_environment_of_gymnax(name: str) -> None:
-    traced_progress(METHODS[name], GymnaxTask("CartPole-v1", episode_steps=12, descriptor=ALONG))
+@pytest.mark.parametrize("method", [MAPPED, STEPPED], ids=lambda method: method.name)
+def test_methods_that_want_more_than_episodes_fit_an_environment(method: Any) -> None:
+    traced_progress(method, BraxTask("fast", episode_steps=12, descriptor=ALONG))
 
 
 def test_a_trial_on_brax_is_trained_and_examined(tmp_path: Path) -> None:
-    result = one_trial(METHODS["cma_es"], FAST, tmp_path)
+    result = one_trial(CmaEs(population=4, network=SMALL), FAST, tmp_path)
     assert result.status == "done"
     assert result.metrics["episode_steps"] == 12.0
     assert result.metrics["last_success"] == 1.0  # of its second generation at the latest
@@ -139,15 +126,6 @@ def test_pictures_are_seen_as_vectors_and_an_environment_made_while_tracing_is_w
     assert result.status == "done"
 
 
-@pytest.mark.slow
-def test_a_pendulum_of_brax_is_paid_for_each_step_that_it_stands(tmp_path: Path) -> None:
-    pendulum = BraxTask("inverted_pendulum", {"backend": "spring"}, episode_steps=60, solved_at=60)
-    result = one_trial(CmaEs(population=8, network=SMALL), pendulum, tmp_path)
-    assert result.status == "done"
-    assert result.metrics["last_fitness"] == pytest.approx(result.metrics["episode_steps"])
-    assert 1 < result.metrics["last_fitness"] <= 60
-
-
 def test_actions_are_a_choice_or_a_range() -> None:
     spaces = pytest.importorskip("gymnasium", reason="Gymnasium is not installed").spaces
     assert actions_of(spaces.Discrete(3), "it") == Choice(3)
@@ -215,7 +193,7 @@ def test_wrong_names_and_what_map_elites_needs_are_sentences() -> None:
     with pytest.raises(UnknownNameError, match="no environment of Brax named 'antt'. Did you mean 'ant'"):
         BraxTask("antt").make()
     with pytest.raises(UserError, match="fast has no descriptor of this. Add one, such as descriptor="):
-        traced_progress(METHODS["map_elites"], FAST)
+        traced_progress(MAPPED, FAST)
     with pytest.raises(UserError, match="episode_steps must be at least 1, not 0"):
         BraxTask("fast", episode_steps=0)
     with pytest.raises(UserError, match="examined_episodes must be at least 1, not 0"):
@@ -246,4 +224,4 @@ def test_a_place_beyond_the_observation_is_not_read_as_its_last_number() -> None
     with pytest.raises(
         UserError, match=r"reads the places \(0, 2\) of its observation, which has 2 numbers. Write places from 0 to 1"
     ):
-        traced_progress(METHODS["map_elites"], BraxTask("fast", episode_steps=12, descriptor=beyond))
+        traced_progress(MAPPED, BraxTask("fast", episode_steps=12, descriptor=beyond))

@@ -13,36 +13,28 @@ from genomes import made, stacked
 from evoclaims.methods.neat import capacity
 from evoclaims.methods.neat.settings import Settings
 
+ALL = [(32, 96), (100, 200), (100, 400)]
+
 
 @pytest.mark.parametrize(
-    ("limits", "wanted"),
+    ("limits", "ends", "wanted"),
     [
-        ((100, 400), [(32, 96), (100, 200), (100, 400)]),
-        ((50, 100), [(32, 96), (50, 100)]),
-        ((32, 96), [(32, 96)]),
-        ((16, 64), [(16, 64)]),
-        ((100, 200), [(32, 96), (100, 200)]),
+        ((100, 400), (2, 1), ALL),
+        ((50, 100), (2, 1), [(32, 96), (50, 100)]),
+        ((32, 96), (2, 1), [(32, 96)]),
+        ((16, 64), (2, 1), [(16, 64)]),
+        ((100, 200), (2, 1), [(32, 96), (100, 200)]),
+        # those that the first networks cannot grow in are not offered
+        ((100, 400), (30, 1), ALL),
+        ((100, 400), (31, 1), ALL[1:]),
+        ((100, 400), (5, 19), ALL[1:]),
+        ((100, 400), (35, 8), ALL[2:]),
     ],
 )
 def test_smaller_arrays_are_offered_where_they_are_smaller(
-    limits: tuple[int, int], wanted: list[tuple[int, int]]
+    limits: tuple[int, int], ends: tuple[int, int], wanted: list[tuple[int, int]]
 ) -> None:
-    assert capacity.capacities(Settings(nodes=limits[0], connections=limits[1]), 2, 1) == wanted
-
-
-@pytest.mark.parametrize(
-    ("inputs", "outputs", "wanted"),
-    [
-        (30, 1, [(32, 96), (100, 200), (100, 400)]),
-        (31, 1, [(100, 200), (100, 400)]),
-        (5, 19, [(100, 200), (100, 400)]),
-        (35, 8, [(100, 400)]),
-    ],
-)
-def test_arrays_that_the_first_networks_cannot_grow_in_are_not_offered(
-    inputs: int, outputs: int, wanted: list[tuple[int, int]]
-) -> None:
-    assert capacity.capacities(Settings(), inputs, outputs) == wanted
+    assert capacity.capacities(Settings(nodes=limits[0], connections=limits[1]), *ends) == wanted
 
 
 @pytest.mark.parametrize(

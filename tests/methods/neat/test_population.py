@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from genomes import at, check, same
 from history import FIRST_KEY, History
 
 from evoclaims.core.errors import UserError
-from evoclaims.methods.neat.population import Population, first_population, forget_records
+from evoclaims.methods.neat.population import Population, first_population
 from evoclaims.methods.neat.settings import Attribute, Mutation, Settings, Species
 
 pytestmark = pytest.mark.newest
@@ -55,17 +53,6 @@ def test_a_new_key_appears_in_one_genome_and_a_lost_one_never_comes_back(history
         before = set().union(*hidden)
 
 
-def test_keys_that_float32_cannot_hold_are_exact(history: History) -> None:
-    keys = np.asarray(history.populations.genomes.nodes.key[-1])
-    assert (keys.astype(np.float32).astype(np.int64) != keys).any()
-
-
-def test_generations_are_counted_and_keys_are_handed_out_in_step(history: History) -> None:
-    generations = np.arange(len(history.fitness) + 1)
-    np.testing.assert_array_equal(history.populations.generation, generations)
-    np.testing.assert_array_equal(history.populations.next_key, FIRST_KEY + generations * history.settings.population)
-
-
 @pytest.fixture(scope="module")
 def first() -> Population:
     """A first population of networks of three inputs and two outputs."""
@@ -101,22 +88,8 @@ def test_the_first_population_is_one_species_around_its_first_genome(first: Popu
     assert int(first.next_key) == 5
 
 
-def test_forgotten_records_are_beaten_by_anything_and_nothing_else_changes(first: Population) -> None:
-    population = replace(first, species=replace(first.species, best=jnp.arange(4.0)))
-    forgotten = forget_records(population)
-    assert np.isneginf(np.asarray(forgotten.species.best)).all()
-    restored = replace(forgotten, species=replace(forgotten.species, best=population.species.best))
-    assert same(restored, population)
-
-
 @pytest.mark.parametrize(("nodes", "connections"), [(7, 12), (8, 11)])
 def test_a_smallest_network_that_does_not_fit_is_one_sentence(nodes: int, connections: int) -> None:
     settings = Settings(population=200, nodes=nodes, connections=connections, species=Species(most=4))
     with pytest.raises(UserError, match="starts with 8 nodes and 12 connections, but nodes="):
         first_population(jax.random.key(0), settings, 6, 2)
-
-
-def test_nothing_about_a_population_is_weakly_typed() -> None:
-    shapes = jax.eval_shape(lambda key: first_population(key, INITIAL, 2, 1), jax.random.key(0))
-    assert {leaf.dtype for leaf in jax.tree.leaves(shapes)} == {jnp.dtype("int32"), jnp.dtype("float32")}
-    assert not [leaf for leaf in jax.tree.leaves(shapes) if leaf.weak_type]

@@ -74,21 +74,6 @@ def test_species_survive_and_are_sorted_as_in_the_reference(situation: Any) -> N
     }
 
 
-def test_a_species_dies_one_generation_after_its_patience_has_ended() -> None:
-    member_of, fitness = [0, 1, 2, 3, *[0] * 20], jnp.array([9.0, 8.0, 5.0, 5.0, *[0.0] * 20])
-    after = _survive(_species(member_of, [9.0, 9.0, 5.0, 5.0], [0, 0, GENERATION - 3, GENERATION - 4]), fitness)
-    assert np.asarray(after.centres.nodes.key)[: int(after.count), 0].tolist() == [0, 1, 2]
-
-
-def test_of_two_equal_species_the_later_comes_first_and_the_earlier_is_exempt() -> None:
-    """TensorNEAT sorts backwards, but ranks forwards."""
-    member_of, fitness = [0, 1, 2, *[0] * 21], jnp.array([7.0, 7.0, 7.0, *[0.0] * 21])
-    after = _survive(_species(member_of, [7.0] * 3, [GENERATION] * 3), fitness)
-    assert np.asarray(after.centres.nodes.key)[:3, 0].tolist() == [2, 1, 0]
-    after = _survive(_species(member_of, [7.0] * 3, [0] * 3), fitness)
-    assert np.asarray(after.centres.nodes.key)[: int(after.count), 0].tolist() == [1, 0]
-
-
 def _offspring(sizes: list[int], population: int, chosen: Species) -> list[int]:
     member_of = [place for place, size in enumerate(sizes) for _ in range(size)]
     species = _species(member_of, most=chosen.most)

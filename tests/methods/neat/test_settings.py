@@ -9,10 +9,12 @@ import pytest
 
 from evoclaims.core.canonical import canonical_json
 from evoclaims.core.errors import UserError
+from evoclaims.methods.neat.evolution import Neat
 from evoclaims.methods.neat.settings import PAPER, Attribute, Mutation, Settings, Species
 
 
 def test_the_defaults_are_the_papers_table() -> None:
+    assert Neat().settings == PAPER
     assert (PAPER.population, PAPER.nodes, PAPER.connections) == (5_000, 100, 400)
     assert (PAPER.activations, PAPER.output) == (("tanh",), "tanh")
     mutation = PAPER.mutation
@@ -35,23 +37,6 @@ def test_settings_are_told_apart_by_their_numbers() -> None:
 
 
 @pytest.mark.parametrize(
-    "wrong",
-    [
-        {"mutate_rate": -0.1},
-        {"replace_rate": -0.1},
-        {"mutate_rate": 0.7, "replace_rate": 0.4},
-        {"std": -1.0},
-        {"power": -0.1},
-        {"power": math.inf},
-        {"bound": 0.0},
-    ],
-)
-def test_impossible_attributes_are_refused(wrong: dict[str, Any]) -> None:
-    with pytest.raises(UserError):
-        Attribute(**wrong)
-
-
-@pytest.mark.parametrize(
     "name", ["node_add", "node_delete", "connection_add", "connection_delete", "activation_replace"]
 )
 @pytest.mark.parametrize("value", [-0.1, 1.1, 2])
@@ -60,30 +45,31 @@ def test_what_is_no_probability_is_refused_by_its_name(name: str, value: float) 
         Mutation(**{name: value})
 
 
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        {"most": 0},
-        {"exempt": 0},
-        {"elites": -1},
-        {"stagnation": -1},
-        {"survival": 0.0},
-        {"survival": 1.5},
-        {"change": -0.5},
-        {"change": 1.5},
-        {"threshold": 0.0},
-        {"on_level_up": "forget"},
+IMPOSSIBLE: dict[type, list[dict[str, Any]]] = {
+    Attribute: [
+        *({name: -0.1} for name in ("mutate_rate", "replace_rate", "power")),
+        {"mutate_rate": 0.7, "replace_rate": 0.4},
+        *({"std": -1.0}, {"power": math.inf}, {"bound": 0.0}),
     ],
-)
-def test_impossible_species_are_refused(wrong: dict[str, Any]) -> None:
-    with pytest.raises(UserError):
-        Species(**wrong)
+    Species: [
+        *(
+            {"most": 0},
+            {"exempt": 0},
+            {"elites": -1},
+            {"stagnation": -1},
+            {"threshold": 0.0},
+            {"on_level_up": "forget"},
+        ),
+        *({name: wrong} for name, wrongs in (("survival", (0.0, 1.5)), ("change", (-0.5, 1.5))) for wrong in wrongs),
+    ],
+    Settings: [{"activations": ()}, {"activations": ("tanh", "step")}, {"output": "step"}, {"population": 99}],
+}
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"activations": ()}, {"activations": ("tanh", "step")}, {"output": "step"}, {"population": 99}]
+    ("kind", "wrong"), [(kind, wrong) for kind, all_ in IMPOSSIBLE.items() for wrong in all_], ids=str
 )
-def test_impossible_settings_are_refused(wrong: dict[str, Any]) -> None:
+def test_what_is_impossible_is_refused(kind: type, wrong: dict[str, Any]) -> None:
     with pytest.raises(UserError):
-        Settings(**wrong)
+        kind(**wrong)
     assert Settings(population=100).population == 100

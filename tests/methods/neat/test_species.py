@@ -114,26 +114,6 @@ def test_points_on_a_line_are_divided_as_the_reference_divides_them(centres: lis
     assert np.asarray(species.improved_at).tolist() == [*range(len(centres)), *[7] * new]
 
 
-def test_the_genome_nearest_to_the_old_centre_is_the_new_centre_even_if_it_is_far() -> None:
-    assert _places(_divided([0.0], [30.0] * 6 + [25.0] * 6)) == [25.0]
-
-
-def test_the_threshold_itself_is_too_far() -> None:
-    joined = np.asarray(_divided([0.0], [0.0, 10.0, *[9.75] * 10]).member_of).tolist()
-    assert joined == [0, 1, *[1] * 10]  # 9.75 is within reach of 0, but nearer to 10
-    assert np.asarray(_divided([0.0], [0.0, *[9.75] * 11]).member_of).tolist() == [0] * 12
-
-
-def test_leftovers_join_the_last_species() -> None:
-    species = _divided([], [0.0, 20.0, 40.0, -20.0, -40.0, 15.0, *[-40.0] * 6])
-    assert np.asarray(species.member_of).tolist() == [0, 1, 2, 3, 3, 1, *[3] * 6]
-    assert _places(species) == [0.0, 20.0, 40.0, -20.0]
-
-
-def test_a_genome_as_near_to_two_centres_joins_the_earlier_species() -> None:
-    assert np.asarray(_divided([-4.0, 4.0], [-4.0, 4.0, *[0.0] * 10]).member_of).tolist() == [0, 1, *[0] * 10]
-
-
 def test_populations_side_by_side_are_divided_as_one_by_one() -> None:
     """The number of species differs, so that loops end at different times."""
     lines: list[Any] = [([0.0], [0.0] * POINTS), ([0.0, 20.0], [5.0 * i for i in range(POINTS)])]

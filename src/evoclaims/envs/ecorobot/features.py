@@ -83,57 +83,19 @@ COUNTS: Final = {
 }
 """What a model has none of, by MuJoCo's counts."""
 
-OPTIONS: Final = frozenset(
-    [
-        "timestep",
-        "gravity",
-        "wind",
-        "density",
-        "viscosity",
-        "magnetic",
-        "impratio",
-        "iterations",
-        "ls_iterations",
-        "tolerance",
-        "ls_tolerance",
-        "jacobian",
-        "noslip_tolerance",
-        "ccd_iterations",
-        "ccd_tolerance",
-        "sdf_initpoints",
-        "sdf_iterations",
-        "sleep_tolerance",
-        "disableflags",
-        "enableflags",
-        "o_margin",
-        "o_solref",
-        "o_solimp",
-        "o_friction",
-    ]
+_OPTIONS: Final = (
+    "timestep gravity wind density viscosity magnetic impratio iterations ls_iterations tolerance ls_tolerance "
+    "jacobian noslip_tolerance ccd_iterations ccd_tolerance sdf_initpoints sdf_iterations sleep_tolerance "
+    "disableflags enableflags o_margin o_solref o_solimp o_friction"
 )
+OPTIONS: Final = frozenset(_OPTIONS.split())
 """MuJoCo's options that may have any value: a step uses them, or they change nothing in it; flags are below."""
 FLAGS: Final = {
-    "disable": [
-        "CONSTRAINT",
-        "LIMIT",
-        "CONTACT",
-        "GRAVITY",
-        "CLAMPCTRL",
-        "WARMSTART",
-        "FILTERPARENT",
-        "ACTUATION",
-        "REFSAFE",
-        "SENSOR",
-        "MIDPHASE",
-        "EULERDAMP",
-        "AUTORESET",
-        "NATIVECCD",
-        "ISLAND",
-        "MULTICCD",
-        "FRICTIONLOSS",
-        "EQUALITY",
-    ],
-    "enable": ["ENERGY", "FWDINV", "INVDISCRETE"],
+    "disable": (
+        "CONSTRAINT LIMIT CONTACT GRAVITY CLAMPCTRL WARMSTART FILTERPARENT ACTUATION REFSAFE SENSOR MIDPHASE EULERDAMP "
+        "AUTORESET NATIVECCD ISLAND MULTICCD FRICTIONLOSS EQUALITY"
+    ),
+    "enable": "ENERGY FWDINV INVDISCRETE",
 }
 """Flags that may be set."""
 LARGEST_TOLERANCE: Final = 1e-8
@@ -201,9 +163,8 @@ def _beyond(model: mujoco.MjModel) -> Iterator[str]:
             yield feature
     bits = {"disable": mujoco.mjtDisableBit, "enable": mujoco.mjtEnableBit}
     for kind, kinds in bits.items():
-        allowed = sum(
-            int(getattr(kinds, f"mj{'DSBL' if kind == 'disable' else 'ENBL'}_{flag}", 0)) for flag in FLAGS[kind]
-        )
+        begin = "mjDSBL_" if kind == "disable" else "mjENBL_"
+        allowed = sum(int(getattr(kinds, begin + flag, 0)) for flag in FLAGS[kind].split())
         set_ = int(getattr(model.opt, f"{kind}flags"))
         for flag in kinds.__members__.values():
             if int(flag) & set_ & ~allowed and not flag.name.startswith("mjN"):

@@ -137,16 +137,9 @@ class Robot:
         for name in ("normal_velocity", "scales_actions"):
             if not isinstance(getattr(self, name), bool):
                 raise UserError(f"The robot {self.name} has {name}={getattr(self, name)!r}. Write True or False.")
-        for name in (
-            "torso_radius",
-            "forward_reward",
-            "control_cost",
-            "healthy_reward",
-            "position_noise",
-            "velocity_noise",
-        ):
-            given = getattr(self, name)
-            signed = name in ("forward_reward", "control_cost", "healthy_reward")
+        signed_ones = ("forward_reward", "control_cost", "healthy_reward")
+        for name in ("torso_radius", *signed_ones, "position_noise", "velocity_noise"):
+            given, signed = getattr(self, name), name in signed_ones
             if not _is_number(given) or math.isinf(given) or (given < 0 and not signed):
                 allowed = "a finite number" if signed else "a finite number of at least 0"
                 raise UserError(f"The robot {self.name} has {name}={given!r}. Write {allowed}.")

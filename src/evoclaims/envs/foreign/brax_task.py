@@ -69,7 +69,6 @@ class BraxTask(JaxTask):
 
 
 def _moment(state: Any) -> Moment:
-    """Return what Brax's state says."""
     return Moment(
         state=state,
         observation=state.obs,

@@ -61,14 +61,8 @@ class GymnasiumTask(ForeignTask):
         """Return a new environment; seed it by its `reset(seed=...)`.
 
         Raises:
-            UserError: when Gymnasium is not installed, or does not make the environment.
+            UserError: when Gymnasium does not make the environment.
         """
-        try:
-            import gymnasium
-        except ImportError as error:
-            raise UserError(
-                f"{self.name} needs Gymnasium, which cannot be imported ({error}). Install it: pip install gymnasium."
-            ) from error
         with self.making("Gymnasium"):
             return gymnasium.make(self.environment_id, max_episode_steps=self.episode_steps, **self.settings)
 
@@ -133,9 +127,7 @@ class GymnasiumTask(ForeignTask):
 
 def _size(space: Any) -> int:
     """Return how many numbers an element of a space has, flattened where it consists of others."""
-    from gymnasium.spaces import flatdim
-
-    return int(flatdim(space) if space.shape is None else np.prod(space.shape))
+    return int(gymnasium.spaces.flatdim(space) if space.shape is None else np.prod(space.shape))
 
 
 class GymnasiumEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):

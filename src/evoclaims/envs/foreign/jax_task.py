@@ -315,7 +315,6 @@ class JaxTask(ForeignTask):
 
     @cached_property
     def _made(self) -> Any:
-        """What `make` returns."""
         with jax.ensure_compile_time_eval():  # its arrays are numbers, also where a function is being traced
             return self.make()
 

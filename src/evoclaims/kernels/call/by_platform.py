@@ -62,7 +62,6 @@ def _shapes(*leaves: ShapedArray, function: Leaves, on_gpu: Leaves, outputs: Sha
 def _batched(
     leaves: Sequence[Array], axes: Sequence[int | None], function: Leaves, on_gpu: Leaves, outputs: Shapes
 ) -> tuple[list[Array], list[int]]:
-    """Compute a batch."""
     size = next(leaf.shape[axis] for leaf, axis in zip(leaves, axes, strict=True) if axis is not None)
     results = BY_PLATFORM.bind(
         *leaves,

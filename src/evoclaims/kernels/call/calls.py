@@ -101,7 +101,6 @@ def _shapes(*leaves: ShapedArray, kernel: Callee) -> list[ShapedArray]:
 
 
 def _batched(leaves: Sequence[Array], axes: Sequence[int | None], kernel: Callee) -> tuple[list[Array], list[int]]:
-    """Compute a batch of calls."""
     results = CALL.bind(*kernel.in_front(leaves, axes), kernel=kernel)
     return results, [0] * len(results)
 

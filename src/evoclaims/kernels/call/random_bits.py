@@ -45,7 +45,6 @@ def kernel_prng(key: PRNGKeyArray) -> PRNGKeyArray:
 
 
 def _random_bits(key: UInt32[Array, " 2"], bit_width: int, shape: tuple[int, ...]) -> Array:
-    """Return random bits."""
     size = math.prod(shape)
     if bit_width > 32 or not 0 < size <= 2**30:  # the kernel counts in int32
         drawn: Array = threefry_prng_impl.random_bits(key, bit_width, shape)

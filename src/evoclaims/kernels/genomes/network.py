@@ -153,7 +153,6 @@ class _Walk:
         return self.page.put(f"fcmp ord {self.floats} {value}, {self.zero}")
 
     def _is_finite(self, value: str) -> str:
-        """Return whether a number is finite."""
         size = self.page.call(self.page.mangled("fabs", "f32"), self.floats, [(self.floats, value)])
         return self.page.put(f"fcmp olt {self.floats} {size}, {self.page.splat('float', INFINITE)}")
 
@@ -161,17 +160,14 @@ class _Walk:
         return self.page.put(f"select {self.bits} {condition}, {self.floats} {yes}, {self.floats} {no}")
 
     def _number(self, type_: str, array: str, place: str) -> str:
-        """Return a number of the genome."""
         where = self.page.put(f"getelementptr {type_}, ptr {array}, i32 {place}")
         return self.page.put(f"load {type_}, ptr {where}, align 4")
 
     def _kept(self, slot: str) -> str:
-        """Return a node's value."""
         where = self.page.put(f"getelementptr {self.floats}, ptr {self.values}, i32 {slot}")
         return self.page.put(f"load {self.floats}, ptr {where}, align {self.alignment}")
 
     def _keep(self, slot: str, value: str) -> None:
-        """Keep a node's value."""
         where = self.page.put(f"getelementptr {self.floats}, ptr {self.values}, i32 {slot}")
         self.page.write(f"store {self.floats} {value}, ptr {where}, align {self.alignment}")
 

@@ -286,7 +286,6 @@ def _normal(output: Float[Array, " doubled"]) -> tuple[Float[Array, " action"], 
 def _log_density(
     raw: Float[Array, " action"], middle: Float[Array, " action"], spread: Float[Array, " action"]
 ) -> Float[Array, ""]:
-    """Return the logarithm of the density of tanh(raw)."""
     normal = -(((raw - middle) / spread) ** 2) / 2 - jnp.log(spread) - math.log(2 * math.pi) / 2
     return jnp.sum(normal - _log_slope(raw))
 

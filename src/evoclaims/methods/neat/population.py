@@ -209,7 +209,6 @@ def _breed(
 
 
 def _resized(population: Population, nodes: int, connections: int) -> Population:
-    """Give all genomes another capacity."""
     return replace(
         population,
         genomes=resized(population.genomes, nodes, connections),

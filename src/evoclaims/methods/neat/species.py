@@ -6,7 +6,6 @@ TensorNEAT's variant: a species has a centre; a genome joins the nearest centre 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -86,19 +85,19 @@ def speciate(settings: Species, species: SpeciesState, population: Genome, gener
 
     def recentre(place: Array, grouping: _Grouping) -> _Grouping:
         # Only genomes that are no centre yet, so that two species never share one.
-        distances = to_all(_at(species.centres, place))
+        distances = to_all(take_rows(species.centres, place))
         chosen = jnp.argmin(jnp.where(grouping.member_of == NONE, distances, jnp.inf)).astype(jnp.int32)
         return _join(grouping, place, chosen)
 
     def gather(place: Array, grouping: _Grouping) -> _Grouping:
-        distances = to_all(_at(population, grouping.centre_of[place]))
+        distances = to_all(take_rows(population, grouping.centre_of[place]))
         return _attract(settings, grouping, place, distances)
 
     def found(grouping: _Grouping) -> _Grouping:
         # The founder also draws nearer genomes from older species, as if its species had been there all along.
         founder = jnp.argmax(grouping.member_of == NONE).astype(jnp.int32)
         founded = _join(grouping, grouping.count, founder)
-        distances = to_all(_at(population, founder))
+        distances = to_all(take_rows(population, founder))
         return replace(_attract(settings, founded, grouping.count, distances), count=grouping.count + 1)
 
     def unfinished(grouping: _Grouping) -> Bool[Array, ""]:
@@ -118,17 +117,13 @@ def speciate(settings: Species, species: SpeciesState, population: Genome, gener
     places = jnp.arange(settings.most)
     alive, new = places < grouping.count, places >= species.count
     return SpeciesState(
-        centres=_at(population, grouping.centre_of),
+        centres=take_rows(population, grouping.centre_of),
         count=grouping.count,
         best=jnp.where(new, -jnp.inf, species.best),
         improved_at=jnp.where(new, generation, species.improved_at),
         size=jnp.where(alive, jnp.sum(member_of[None, :] == places[:, None], axis=1, dtype=jnp.int32), 0),
         member_of=member_of,
     )
-
-
-def _at(genomes: Genome, place: Any) -> Genome:
-    return take_rows(genomes, place)
 
 
 def _join(grouping: _Grouping, place: Int[Array, ""], chosen: Int[Array, ""]) -> _Grouping:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import io
 import re
 from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from evoclaims.core.drawing import optional
 from evoclaims.core.errors import UnknownNameError
@@ -38,30 +36,38 @@ def _texts(svg: bytes) -> list[str]:
     return re.findall(r"<text[^>]*>([^<]*)</text>", svg.decode())
 
 
-def _pixels(png: bytes) -> NDArray[np.uint8]:
-    """Return red, green and blue of each pixel, shape [rows, columns, 3]."""
-    image = optional("PIL.Image").open(io.BytesIO(png)).convert("RGB")
-    return np.asarray(image)
-
-
 def _axis() -> Any:
     return optional("matplotlib.figure").Figure().add_subplot()
 
 
-def test_a_mazes_picture_names_its_stones_and_what_is_to_be_seen() -> None:
-    texts = _texts(draw(MAZE, [], "a title", "svg"))
-    for text in ("a title", "simple_rob at the start, to scale", "wall", "x, m", "y, m", *map(str, range(1, 8))):
-        assert text in texts
-    assert "stones, to be crossed in order (within 0.1 m)" in texts
-    assert "target (within 0.1 m)" in texts
-    assert not any("path" in text for text in texts)
-
-
-def test_a_courses_picture_tells_each_obstacles_number_and_height() -> None:
-    texts = _texts(draw(Obstacles(), [], "a course", "svg"))
-    heights = [0.1] * 5 + [0.2] * 5 + [0.3] * 5
-    assert {f"{i}: {height} m" for i, height in enumerate(heights, start=1)} <= set(texts)
-    assert "half_cheetah at the start, to scale" in texts
+@pytest.mark.parametrize(
+    ("task", "paths", "told"),
+    [
+        (
+            MAZE,
+            [],
+            {
+                *("a title", "simple_rob at the start, to scale", "wall", "x, m", "y, m", *map(str, range(1, 8))),
+                *("stones, to be crossed in order (within 0.1 m)", "target (within 0.1 m)"),
+            },
+        ),
+        (MAZE, [PATH, PATH], {"paths of the torso in 2 episodes, and their ends"}),
+        (
+            Obstacles(),
+            [PATH],
+            {
+                *("half_cheetah at the start, to scale", "path of the torso, its end"),
+                *(f"{i}: {height} m" for i, height in enumerate([0.1] * 5 + [0.2] * 5 + [0.3] * 5, start=1)),
+            },
+        ),
+        (Locomotion(robot=ANT), [PATH], {"ant at the start, to scale"}),
+    ],
+    ids=["maze", "paths", "course", "no walls"],
+)
+def test_a_picture_tells_what_is_to_be_seen(task: Any, paths: list[Any], told: set[str]) -> None:
+    texts = _texts(draw(task, paths, "a title", "svg"))
+    assert told <= set(texts)
+    assert any("path" in text for text in texts) == bool(paths)
 
 
 def test_the_ground_has_each_wall_and_each_mark_at_its_place() -> None:
@@ -103,20 +109,11 @@ def test_the_picture_reaches_as_far_as_a_path_that_leaves_the_maze() -> None:
     assert axis.get_xlim()[0] == pytest.approx(-4.6)
 
 
-def test_paths_are_told_in_the_legend() -> None:
-    assert "paths of the torso in 2 episodes, and their ends" in _texts(draw(MAZE, [PATH, PATH], "", "svg"))
-    assert "path of the torso, its end" in _texts(draw(Obstacles(), [PATH], "", "svg"))
-
-
 def test_places_that_are_not_finite_are_left_out() -> None:
     broken = np.concatenate([PATH, np.full((3, 3), np.nan), np.full((1, 3), np.inf)])
     for task in (MAZE, Obstacles()):
         assert draw(task, [broken], "", "svg") == draw(task, [PATH], "", "svg")
         draw(task, [np.full((2, 3), np.nan)], "", "svg")
-
-
-def test_a_task_without_walls_is_drawn() -> None:
-    assert "ant at the start, to scale" in _texts(draw(Locomotion(robot=ANT), [PATH], "", "svg"))
 
 
 @pytest.mark.parametrize("file_format", ["svg", "png"])

@@ -145,7 +145,6 @@ def draw(task: RobotTask, paths: Sequence[NDArray[np.floating]], title: str, fil
 
 
 def _ground(task: RobotTask, paths: Sequence[TorsoPath], title: str) -> Any:
-    """Build the picture from above."""
     low, high = ground_shown(task, paths)
     size = (high - low) * WIDTH[FROM_ABOVE] / (high - low).max() + np.array([1.0, 1.9])
     figure = _figure(size)
@@ -159,7 +158,6 @@ def _ground(task: RobotTask, paths: Sequence[TorsoPath], title: str) -> Any:
 
 
 def _course(task: RobotTask, paths: Sequence[TorsoPath], title: str) -> Any:
-    """Build the picture from the side, in rows below each other."""
     start = at_start(task)
     covered = np.concatenate([start.torso, *paths])
     low = float(covered[:, 0].min()) - 1.5
@@ -191,7 +189,6 @@ def _figure(size: Any) -> Any:
 
 
 def _legend(figure: Any, task: RobotTask, paths: int, columns: int) -> None:
-    """Add a legend below the picture."""
     lines, patches = optional("matplotlib.lines"), optional("matplotlib.patches")
     handles = [patches.Patch(facecolor=ROBOT, label=f"{task.robot.name} at the start, to scale")]
     if task.boxes:
