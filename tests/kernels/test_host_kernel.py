@@ -6,8 +6,10 @@ import platform
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 import pytest
 
+from evoclaims.kernels import one_kernel
 from evoclaims.kernels.call.kernel import Kernel
 from evoclaims.kernels.emit import machine_code
 
@@ -29,3 +31,21 @@ def test_spilled_registers_have_a_short_address() -> None:
     moves = [line for line in machine_code._target().emit_assembly(made).splitlines() if "mm" in line]
     assert sum("(%rbx)" in line for line in moves) > 100
     assert not any("(%rsp)" in line for line in moves)
+
+
+def test_floats_beyond_the_largest_integer_become_it() -> None:
+    most = 2**31 - 1
+    wanted = {
+        0.0: 0,
+        -1.9: -1,
+        1.9: 1,
+        np.nan: 0,
+        np.inf: most,
+        -np.inf: -most - 1,
+        2.0**31: most,
+        -(2.0**31): -most - 1,
+    }
+    wanted |= {3e9: most, -3e9: -most - 1, 2147483520.0: 2147483520, -2147483520.0: -2147483520}
+    floats = np.array(list(wanted), np.float32)
+    made = jax.vmap(one_kernel(lambda x: x.astype(jnp.int32), "This"))(floats)
+    np.testing.assert_array_equal(made, list(wanted.values()))
