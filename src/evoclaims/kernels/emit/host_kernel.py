@@ -111,15 +111,17 @@ def text(results: Sequence[Numbers], arrays: Mapping[int, ArrayRow], lanes: int)
 def _block(page: Instructions, results: Sequence[Numbers], arrays: Mapping[int, ArrayRow]) -> None:
     """Write the computation of rows `row`, `row` + 1, … to at most `last`, one per lane.
 
-    Lanes beyond `last` compute the last row, and store nothing.
+    Lanes beyond `last` compute the last row, and store the same as the lane of that.
     """
     lanes, integers, pointers = page.lanes, page.vector("i32"), page.vector("ptr")
     page.label("entry")
+    # Memory of unknown size (none) on the stack makes LLVM find what does not fit the registers by a base pointer. By
+    # x86's stack pointer each such instruction is a byte longer, and some processors decode few of nine bytes.
+    page.put(f"alloca {integers}, i64 {page.put('and i64 %row, 0')}, align {4 * lanes}")
     left = page.put("sub i64 %last, %row")
     few = page.call("llvm.umin.i64", "i64", [("i64", left), ("i64", str(lanes - 1))])
     last = page.in_all_lanes("i32", page.put(f"trunc i64 {few} to i32"))
     numbers = f"<{', '.join(f'i32 {lane}' for lane in range(lanes))}>"
-    inside = page.put(f"icmp ule {integers} {numbers}, {last}")
     lane = page.call(page.mangled("umin", "i32"), integers, [(integers, numbers), (integers, last)])
     rows = {array: _rows(page, array, row, lane) for array, row in arrays.items()}
     everywhere = page.splat("i1", "true")
@@ -146,7 +148,7 @@ def _block(page: Instructions, results: Sequence[Numbers], arrays: Mapping[int, 
             if kind == "b":
                 value = page.put(f"zext {page.vector('i1')} {value} to {stored}")
             where = _addresses(page, address, offsets, at, kind)
-            others = ("i32", str(BYTES[kind])), (page.vector("i1"), inside)
+            others = ("i32", str(BYTES[kind])), (page.vector("i1"), everywhere)
             page.call(scatter, "void", [(stored, value), (pointers, where), *others])
     page.write("ret void")
 

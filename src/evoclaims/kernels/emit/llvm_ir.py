@@ -13,6 +13,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+import numpy as np
+
 from evoclaims.kernels.trace.expressions import (
     FUSED,
     Choice,
@@ -267,8 +269,8 @@ class Instructions:
         to = self.vector(TYPES[operation.dtype.kind])
         if name == "bits":
             return self.put(f"bitcast {type_} {operands[0]} to {to}")
-        if kind == "f":  # to an integer: no overflow, and NaN is 0
-            return self.call(self.mangled("fptosi.sat", "i32", "f32"), to, [(type_, operands[0])])
+        if kind == "f":
+            return self._truncated(operands[0])
         return self.put(f"{CASTS[kind + operation.dtype.kind]} {type_} {operands[0]} to {to}")
 
     def divided(self, dividend: str, divisor: str) -> str:
@@ -279,6 +281,21 @@ class Instructions:
         """Write an exactly rounded square root of a float; return its register."""
         type_ = self.vector("float")
         return self.call(self.mangled(INTRINSICS["f"]["sqrt"], "f32"), type_, [(type_, number)])
+
+    def _truncated(self, number: str) -> str:
+        """Write a float as an integer: no overflow, and NaN is 0."""
+        type_, to = self.vector("float"), self.vector("i32")
+        if self.lanes == 1:
+            return self.call(self.mangled("fptosi.sat", "i32", "f32"), to, [(type_, number)])
+        # LLVM would write that lane by lane.
+        beyond, condition = self.splat("float", literal(np.float32(2**31))), self.vector("i1")
+        size = self.call(self.mangled("fabs", "f32"), type_, [(type_, number)])
+        fits = self.put(f"fcmp olt {type_} {size}, {beyond}")
+        safe = self.put(f"select {condition} {fits}, {type_} {number}, {type_} zeroinitializer")
+        high, low = (self.put(f"fcmp {order} {type_} {number}, zeroinitializer") for order in ("ogt", "olt"))
+        limit = self.put(f"select {condition} {low}, {to} {self.splat('i32', str(-(2**31)))}, {to} zeroinitializer")
+        limit = self.put(f"select {condition} {high}, {to} {self.splat('i32', str(2**31 - 1))}, {to} {limit}")
+        return self.put(f"select {condition} {fits}, {to} {self.put(f'fptosi {type_} {safe} to {to}')}, {to} {limit}")
 
     def _fused(self, name: str, c: str, a: str, b: str) -> str:
         """Write a sum or difference of a number and a product, rounded once."""

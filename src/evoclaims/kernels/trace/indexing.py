@@ -144,13 +144,12 @@ def _sorted(s: Scalars, before: str, keys: Numbers, columns: Sequence[Numbers], 
     size = keys.shape[-1]
     results = [np.empty((*keys.shape[:-1], count), object) for _ in columns]
     for at in np.ndindex(*keys.shape[:-1]):
-        rank: list[Number] = [np.int32(0)] * size
+        rank: list[Number] = [np.int32(size - 1 - place) for place in range(size)]  # as if later ones came before
         for later in range(size):
             for earlier in range(later):
-                keep = s.algebra.apply(before, keys[at][earlier], keys[at][later])
-                rank[later] = s.algebra.apply("add", rank[later], s.algebra.cast(keep, np.int32))
-                swap = s.algebra.cast(s.algebra.apply("not", keep), np.int32)
-                rank[earlier] = s.algebra.apply("add", rank[earlier], swap)
+                keep = s.algebra.cast(s.algebra.apply(before, keys[at][earlier], keys[at][later]), np.int32)
+                rank[later] = s.algebra.apply("add", rank[later], keep)
+                rank[earlier] = s.algebra.apply("sub", rank[earlier], keep)
         for result, column in zip(results, columns, strict=True):
             for place in range(count):
                 value = column[at][size - 1]
