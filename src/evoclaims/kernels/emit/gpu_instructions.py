@@ -13,7 +13,7 @@ signs, infinities and NaN, except that
   exact;
 * so may a denormal quotient by a unit, where the exact one lies in the middle of two numbers, or below 2^-149;
 * so may one by a divisor above 2^126 by a unit, since its reciprocal is denormal, and by one of the few largest be 0;
-* a divisor of at most 2^-128, whose reciprocal is infinite, counts as 0; and
+* a divisor below 2^-128, whose reciprocal is infinite, counts as 0, and 2^-128 itself may; and
 * a quotient that is one of the few largest numbers may be infinite.
 """
 
