@@ -31,6 +31,9 @@ on another machine, or stopped (SIGSTOP, Ctrl-Z). If that process was on this ma
 REFRESH_SECONDS: Final = 15.0
 """Time between two refreshes: on a slow network folder, a few may be late before the lease looks stale."""
 
+POLL_SECONDS: Final = 0.2
+"""Time between two looks at another process's lease."""
+
 _CONTAINER: Final = "?pidns-"
 """What filelock adds to the host name in its own PID namespace, as in a container; a number follows."""
 
@@ -59,7 +62,6 @@ def announced(
     store_root: Path,
     condition_id: str,
     tell: Callable[[str], None] = lambda text: None,
-    poll: float = 0.2,
     sleep: Callable[[float], None] = time.sleep,
 ) -> Iterator[None]:
     """Wait until no other process runs a condition; announce, during a `with` block, that this process does.
@@ -70,7 +72,6 @@ def announced(
         store_root: the store's folder.
         condition_id: the condition to run.
         tell: receives a line of progress each time it looks at another process's lease.
-        poll: seconds between two looks.
         sleep: how to wait.
     """
     path = lease_path(store_root, condition_id)
@@ -89,7 +90,7 @@ def announced(
             continue
         who = f"process {owner.pid} on {owner.hostname.partition(_CONTAINER)[0]}" if owner else "another process"
         tell(f"waiting for {who}, which runs the same condition")
-        sleep(poll)
+        sleep(POLL_SECONDS)
     try:
         yield
     finally:
