@@ -24,7 +24,8 @@ CONDITIONS, TRIALS = 5, 10
 
 def main() -> None:
     """Print in how many runs a drift is found, with seeds exchanged together and apart."""
-    correlation, runs = (kind(text) for kind, text in zip((float, int), (*sys.argv[1:], "0.9", "400")[:2], strict=True))
+    given = [*sys.argv[1:], *("0.9", "400")[len(sys.argv) - 1 :]]
+    correlation, runs = float(given[0]), int(given[1])
     draw, found = np.random.default_rng(20251127), {"together": 0, "apart": 0}
     for _ in range(runs):
         shared = draw.standard_normal((2 * TRIALS, 1)) * correlation**0.5

@@ -81,7 +81,8 @@ def _like(pilot: TrialResult, trial: TrialResult) -> TrialResult:
 
 def main() -> None:
     """Print in how many runs a method is found, without a shift and with one."""
-    shift, runs = (kind(text) for kind, text in zip((float, int), (*sys.argv[1:], "0.8", "20")[:2], strict=True))
+    given = [*sys.argv[1:], *("0.8", "20")[len(sys.argv) - 1 :]]
+    shift, runs = float(given[0]), int(given[1])
     conditions = drawn_from()
     varying = [one.method for one in conditions if one.score is not None]
 

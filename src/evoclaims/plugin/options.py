@@ -241,7 +241,7 @@ def import_from_root(config: pytest.Config) -> None:
 
 
 def settings_of(config: pytest.Config) -> SuiteConfig | None:
-    """Return the settings of the project; None for one without claims, or where they cannot be read: told later."""
+    """Return the project's settings; None if it has no claims, or they cannot be read, which a later error says."""
     from evoclaims.paper.config import load_config
 
     try:
