@@ -14,9 +14,10 @@ from evoclaims.core.errors import UserError
 from evoclaims.envs.ecorobot.boxes import Box, Surface
 from evoclaims.envs.ecorobot.deceptive import DeceptiveMaze
 from evoclaims.envs.ecorobot.locomotion import Locomotion, Obstacles
+from evoclaims.envs.ecorobot.maze import MazePlan
 from evoclaims.envs.ecorobot.robots import SIMPLE_ROB
 from evoclaims.envs.ecorobot.sensors import Rangefinders
-from evoclaims.envs.ecorobot.stones import SteppingStones
+from evoclaims.envs.ecorobot.stones import PLAN, SteppingStones
 
 WRONG: Any = "steep"
 BOX: dict[str, Any] = {"centre": (0.0, 0.0), "half_size": (1.0, 1.0)}
@@ -28,6 +29,18 @@ BOX: dict[str, Any] = {"centre": (0.0, 0.0), "half_size": (1.0, 1.0)}
         (partial(DeceptiveMaze, difficulty=WRONG), "no difficulty named 'steep'.* Known: difficult, easy"),
         (partial(SteppingStones, within=math.nan), "stepping_stones has within=nan. Write a finite distance above 0"),
         (partial(SteppingStones, within=math.inf), "stepping_stones has within=inf. Write a finite distance above 0"),
+        *(
+            (partial(make, within=wrong), f"A MazePlan has within={wrong}. Write a finite distance above 0")
+            for make in (partial(MazePlan, *PLAN[:-1]), PLAN._replace)
+            for wrong in (math.nan, math.inf, 0.0, -1.0)
+        ),
+        *(
+            (partial(PLAN._replace, **numbers), "A MazePlan has area=.* Write finite numbers, and of each side of the")
+            for numbers in (
+                *({name: (0.0, wrong)} for name in ("start", "target") for wrong in (math.nan, math.inf)),
+                *({"area": ((0.0, 1.0), wrong)} for wrong in ((0.0, math.nan), (1.0, 1.0), (0.0, math.inf))),
+            )
+        ),
         (partial(Obstacles, heights=WRONG), "no profile of heights named 'steep'.* Known: hierarchical, high, medium"),
         *(
             (partial(kind, **{name: 0}), f"{kind.name}'s {name} must be at least 1, not 0")

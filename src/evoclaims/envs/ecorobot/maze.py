@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Final, NamedTuple
+from itertools import chain
+from typing import Any, Final, NamedTuple, Self
 
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 from numpy.typing import NDArray
 
+from evoclaims.core.errors import UserError
 from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.robot_task import RobotTask
 from evoclaims.envs.ecorobot.sensors import Rangefinders, Sensor
@@ -26,14 +29,37 @@ FINE: Final = 4
 """Points along each side of a cell for computing reachability."""
 
 
-class MazePlan(NamedTuple):
-    """A maze: walls, the ground between them, start, target, and the distance that counts as reached, m."""
-
+class _Plan(NamedTuple):
     walls: tuple[Box, ...]
     area: Area
     start: tuple[float, float]
     target: tuple[float, float]
     within: float
+
+
+class MazePlan(_Plan):
+    """A maze: walls, the ground between them, start, target, and the distance that counts as reached, m."""
+
+    __slots__ = ()
+
+    def __new__(
+        cls, walls: tuple[Box, ...], area: Area, start: tuple[float, float], target: tuple[float, float], within: float
+    ) -> Self:
+        """Check its numbers: a target within NaN is never reached."""
+        places = (*start, *target, *chain.from_iterable(area))
+        if not all(map(math.isfinite, places)) or any(low >= high for low, high in area):
+            raise UserError(
+                f"A MazePlan has area={area}, start={start} and target={target}. Write finite numbers, and of each "
+                "side of the area the lowest first."
+            )
+        if not 0 < within < math.inf:
+            raise UserError(f"A MazePlan has within={within}. Write a finite distance above 0, in m.")
+        return super().__new__(cls, walls, area, start, target, within)
+
+    @classmethod
+    def _make(cls, iterable: Iterable[Any]) -> Self:  # type: ignore[override]
+        """Return the plan with these values, of which `_replace` makes another plan."""
+        return cls(*iterable)
 
 
 @dataclass(frozen=True)
