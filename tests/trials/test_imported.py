@@ -262,8 +262,14 @@ def test_what_only_some_programs_take_for_a_number_is_none(table: Callable[..., 
             CURVES.replace("3,100", "3,200"),
             r"two rows of seed 3 and global_step 200 \(rows 1 and 2\): if there are several",
         ),
-        (CURVES.replace("3,100", "3,"), "Row 2 of .* has no step, a number from 0 on, in the column 'global_step'"),
-        (CURVES.replace("3,100", "3,-1"), "Row 2 of .* has no step, a number from 0 on, in the column 'global_step'"),
+        (CURVES.replace("3,100", "3,"), "Row 2 of .* has no step in the column 'global_step': write .* whole numbers"),
+        *(
+            (
+                CURVES.replace("3,100", f"3,{step}"),
+                f"Row 2 of .* has the step {step} in the column 'global_step': write",
+            )
+            for step in ("-1.0", "100.5", "nan", "inf")
+        ),
     ],
 )
 def test_each_row_of_a_curve_has_a_step_of_its_own(table: Callable[..., Imported], text: str, said: str) -> None:

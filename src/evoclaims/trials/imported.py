@@ -55,13 +55,15 @@ class TrialRows:
         """Return the steps of some rows.
 
         Raises:
-            UserError: when one has no step, a number from 0 on.
+            UserError: when one has no step, a whole number from 0 on: a budget is one, and a curve reaches it or not.
         """
         found = self.table.numbers(self.step, "the steps", rows)
         for row, step in zip(rows, found, strict=True):
-            if step is None or not 0 <= step < math.inf:
+            if step is None or step < 0 or not step.is_integer():
+                has = "no step" if step is None else f"the step {step!r}"
                 raise UserError(
-                    f"Row {row + 1} of {self.table.name} has no step, a number from 0 on, in the column {self.step!r}."
+                    f"Row {row + 1} of {self.table.name} has {has} in the column {self.step!r}: write environment "
+                    "steps, whole numbers from 0 on."
                 )
         return [step for step in found if step is not None]
 
