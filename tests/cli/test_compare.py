@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +13,7 @@ from tiny_project import Evoclaims, aged, forget, out_of_time, spoiled, trials_o
 
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper import references
-from evoclaims.trials.result import TrialResult
+from evoclaims.trials.result import TrialResult, digest
 from evoclaims.trials.store import Store
 from evoclaims.verdicts import history
 
@@ -31,6 +32,13 @@ def _copy(to: str, change: Callable[[TrialResult], TrialResult] = lambda trial: 
     """Fill a store with the changed trials of the right network."""
     for trial in trials_of(Store(OWN), "hand_built"):
         Store(Path(to)).put(change(replace(trial, champion="")), {})
+
+
+def _either(trial: TrialResult) -> TrialResult:
+    """Return a trial that went well or not, by its seed."""
+    metrics = {**trial.metrics, "mean_success": float(trial.seed % 2)}
+    new = digest(trial.status, metrics, trial.levels, trial.curves, b"")
+    return replace(trial, metrics=metrics, digest=new, champion="")
 
 
 def test_what_is_as_accepted_is_counted_and_not_listed(accepted: Evoclaims) -> None:
@@ -79,6 +87,19 @@ def test_new_trials_that_drifted_from_the_references_are_said(evoclaims: Evoclai
     assert "to the bit: 10 trials compared, 10 changed" in out
     assert "  CHANGED in smoke/right-parity: seeds 0, 1, 2, 3, 4, 5, 6, 7, 8, 9\n" in out
     assert "trials of the new side alone: smoke/wrong-parity" in out
+
+
+def test_methods_whose_names_begin_alike_before_a_dash_are_tested_each_for_itself(evoclaims: Evoclaims) -> None:
+    for path in (Path("tiny_paper.py"), Path("claims/test_claims.py")):
+        text = re.sub("""(["'])right(["'])""", r"\1my-a\2", path.read_text(encoding="utf-8"))
+        path.write_text(re.sub("""(["'])wrong(["'])""", r"\1my-b\2", text), encoding="utf-8")
+    for name, method in (("my-a", "hand_built"), ("my-b", "hand_built_negated")):
+        path = references.path_of(Path("reference"), "smoke", name, "parity")
+        references.write(path, map(_either, trials_of(Store(OWN), method)))
+    evoclaims("accept", "--tier=smoke")
+    _, out, _ = evoclaims("compare", "--tier=smoke")
+    assert "trials: 2 comparisons, 0 drifted" in out  # together they would have
+    assert " SD in smoke/my-a, smoke/my-b\n" in out
 
 
 def test_versions_behind_both_sides_are_said_where_a_condition_depends_on_them(evoclaims: Evoclaims) -> None:

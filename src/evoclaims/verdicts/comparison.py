@@ -35,6 +35,7 @@ class Side:
         trials: by condition.
         troubles: a line for each file that could not be read.
         reads: what claims read of each trial, by condition, where that is known.
+        methods: by condition, where they are known: with that of another tier or variant none is tested jointly.
     """
 
     name: str
@@ -42,6 +43,7 @@ class Side:
     trials: Trials
     troubles: tuple[str, ...] = ()
     reads: Mapping[str, frozenset[str]] = field(default_factory=dict)
+    methods: Mapping[str, PurePosixPath] = field(default_factory=dict)
 
     def of(self, tiers: Iterable[str]) -> Side:
         """Return the part of this side that belongs to some tiers."""
@@ -75,6 +77,7 @@ def store(reproduction: Reproduction, archive: Archive, reports: Iterable[ClaimR
     """
     names, damaged, reports = names_of(reproduction), list[DamagedFileError](), list(reports)
     trials: dict[str, list[TrialResult]] = defaultdict(list)
+    methods: dict[str, PurePosixPath] = {}
     versions = {
         condition: reproduction.tier(known[0].tier, known[0].variant).condition(known[0].method, known[0].task).versions
         for condition, known in names.items()
@@ -83,8 +86,9 @@ def store(reproduction: Reproduction, archive: Archive, reports: Iterable[ClaimR
     for trial in _judged(archive, {trial: versions[condition] for trial, condition in found.items()}):
         for name in names[trial.condition]:
             folder = reproduction.references_of(name.variant)
-            path = references.path_of(folder, name.tier, name.method, name.task)
-            trials[_named(path.relative_to(reproduction.references))].append(trial)
+            path = references.path_of(folder, name.tier, name.method, name.task).relative_to(reproduction.references)
+            trials[_named(path)].append(trial)
+            methods[_named(path)] = PurePosixPath(path.parent, name.method)
     troubles = tuple(f"not read: {error}" for error in damaged)
     reads: dict[str, set[str]] = defaultdict(set)
     for report in reports:
@@ -94,7 +98,7 @@ def store(reproduction: Reproduction, archive: Archive, reports: Iterable[ClaimR
             )
             reads[_named(path.relative_to(reproduction.references))].update(source.reads)
     known = {name: frozenset(those) for name, those in reads.items()}
-    return Side(f"the store {archive.store.root}", transitions.standings(reports), trials, troubles, known)
+    return Side(f"the store {archive.store.root}", transitions.standings(reports), trials, troubles, known, methods)
 
 
 def _judged(archive: Archive, trials: Mapping[str, Versions]) -> Iterator[TrialResult]:
@@ -109,7 +113,10 @@ def _judged(archive: Archive, trials: Mapping[str, Versions]) -> Iterator[TrialR
 
 
 def compare_trials(old: Side, new: Side) -> tuple[DriftReport, DigestCheck]:
-    """Check the conditions that both sides have for drift, and CPU trials for bit-identical results."""
+    """Check the conditions that both sides have for drift, and CPU trials for bit-identical results.
+
+    The new side is a store's, whose methods are known: in the name of a file, "my-a-parity", none is.
+    """
     both = sorted(name for name in old.trials.keys() & new.trials.keys() if new.trials[name])
     return references.compare(
         [
@@ -117,7 +124,7 @@ def compare_trials(old: Side, new: Side) -> tuple[DriftReport, DigestCheck]:
                 name,
                 new.trials[name],
                 old.trials[name],
-                method=name.partition("-")[0],
+                method=str(new.methods[name]),
                 reads=new.reads.get(name, ()) or old.reads.get(name, ()),
             )
             for name in both
