@@ -5,12 +5,14 @@ from __future__ import annotations
 import re
 import shutil
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from tiny_project import BODIES, Evoclaims, Project, aged, spoiled, trials_of
 
 from evoclaims.paper import references
+from evoclaims.trials.result import TrialResult, digest
 from evoclaims.trials.store import Store
 from evoclaims.verdicts import watch_file
 from evoclaims.verdicts.watch_file import load
@@ -41,6 +43,11 @@ def watching(evoclaims: Evoclaims, stored: Store, kept: Path) -> Evoclaims:
 
 def method_name(method: str) -> str:
     return {"right": "hand_built", "wrong": "hand_built_negated"}[method]
+
+
+def resealed(trial: TrialResult) -> TrialResult:
+    """Return an edited trial with the digest of what it has now."""
+    return replace(trial, digest=digest("done", trial.metrics, trial.levels, trial.curves, b""), champion="")
 
 
 def seeds(store: Store) -> list[int]:
@@ -150,6 +157,18 @@ def test_what_cannot_be_watched_is_said_before_anything_runs(watching: Evoclaims
     shutil.rmtree("reference")
     assert_refused(watching, "no condition of the smoke tier's claims has ten committed trials")
     assert sorted(stored.ids()) == before
+
+
+@pytest.mark.parametrize("seed", [0, 3])
+def test_a_measure_that_one_committed_trial_lacks_is_said(watching: Evoclaims, project: Project, seed: int) -> None:
+    project.write(a="verdict(trials('right', on='parity').measure('smoothness') > 1.0)")
+    trials = [replace(trial, metrics={**trial.metrics, "smoothness": 2.0}) for trial in references.load(COMMITTED)]
+    trials[seed].metrics.pop("smoothness")
+    references.write(COMMITTED, [resealed(trial) for trial in trials])
+    status, out, _ = watching("watch", "--trials=3")
+    assert status == 0
+    assert f"Not watched, since some reference trials lack it: right on parity: smoothness (seed {seed}).\n" in out
+    assert "smoothness" not in load(FILE)[1][-1].values["right on parity"]
 
 
 def test_a_broken_claim_takes_no_condition_from_the_watch(watching: Evoclaims, project: Project, stored: Store) -> None:

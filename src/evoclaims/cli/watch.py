@@ -219,6 +219,13 @@ def _sentences(
         )
     if left_out:
         lines.append(f"Not watched, for want of ten committed trials: {', '.join(left_out)}.")
+    lacking = [
+        f"{one.label}: {measure} (seed{'s' * (len(seeds) > 1)} {', '.join(map(str, seeds))})"
+        for one in watch.conditions
+        for measure, seeds in one.lacking.items()
+    ]
+    if lacking:
+        lines.append(f"Not watched, since some reference trials lack it: {', '.join(lacking)}.")
     if gone:
         lines.append(
             f"No longer watched, since no claim reads it: {', '.join(gone)}. If this is meant, begin a new series with "

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Final
 
@@ -55,6 +55,7 @@ class Watched:
         values: what each measure is in them, in the order of seeds; in the reference trials alone if pilots lack it.
         versions: of the packages that they were made with.
         devices: kinds of those that made them, in alphabetical order.
+        lacking: seeds of the reference trials that lack a measure of the others, by the measure, which is not watched.
     """
 
     names: Names
@@ -63,6 +64,7 @@ class Watched:
     values: Mapping[str, tuple[float, ...]]
     versions: Versions
     devices: tuple[str, ...]
+    lacking: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
 
     @property
     def label(self) -> str:
@@ -128,12 +130,23 @@ def watched(
             every = mine
     versions = recorded(done[-1].provenance, condition.packages)
     devices = kinds_of(every.values())
-    return Watched(names, condition, tuple(sorted(every)), values, versions, devices) if values else None
+    known = references.measures(done, {name for one in done for name in reads(one)})
+    without = {name: tuple(one.seed for one in done if not _has(one, name)) for name in known}
+    lacking = {name: seeds for name, seeds in without.items() if 0 < len(seeds) < len(done)}
+    return Watched(names, condition, tuple(sorted(every)), values, versions, devices, lacking) if values else None
 
 
 def kinds_of(trials: Iterable[TrialResult]) -> tuple[str, ...]:
     """Return the kinds of the devices that made some trials, in alphabetical order."""
     return tuple(sorted({str(trial.device.get("kind", "unknown")) for trial in trials}))
+
+
+def _has(trial: TrialResult, measure: str) -> bool:
+    try:
+        _number(trial, measure)
+    except KeyError:
+        return False
+    return True
 
 
 def _number(trial: TrialResult, measure: str) -> float:
