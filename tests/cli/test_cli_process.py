@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
+import time
 from importlib import metadata
 from pathlib import Path
 
 import pytest
-from tiny_project import Project
+from tiny_project import Project, trials_of
 
 from evoclaims.trials.store import Store
 
@@ -45,6 +47,33 @@ def test_help_and_unknown_commands_wait_for_no_library(tmp_path: Path) -> None:
     assert ends == [*["ended with 0"] * 3, *["ended with 2"] * 2], done.stderr
     assert done.stdout.startswith(f"evoclaims {metadata.version('evoclaims')}\n")
     assert "invalid choice: 'runn'" in done.stderr
+
+
+SLOW = """    def init(self, key, task):
+        import time; time.sleep(600)
+        return jnp.where"""
+
+
+def test_a_second_ctrl_c_ends_a_run_by_its_sentence_and_loses_no_trial(project: Project) -> None:
+    project.write(a="supported", c="undecided")
+    paper = project.path / "tiny_paper.py"
+    text = paper.read_text(encoding="utf-8")
+    paper.write_text(text.replace("    def init(self, key, task):\n        return jnp.where", SLOW), encoding="utf-8")
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    command = [sys.executable, "-c", COMMAND, "run", "--numprocesses=2"]
+    with subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True) as run:
+        assert run.stderr is not None
+        store, deadline = Store(project.path / ".evoclaims"), time.monotonic() + 120
+        while len(store.ids()) < 10 and time.monotonic() < deadline:
+            time.sleep(0.05)
+        run.send_signal(signal.SIGINT)
+        sentence = "evoclaims: interrupted; the same command goes on from the last checkpoint.\n"
+        said = next(line for line in run.stderr if line == sentence or "Traceback" in line)
+        while run.poll() is None and time.monotonic() < deadline:
+            run.send_signal(signal.SIGINT)
+            time.sleep(0.001)
+        assert (run.returncode, said, run.stderr.read()) == (130, sentence, "")
+    assert len(trials_of(store, "hand_built")) == 10
 
 
 WITHOUT_JAX = """

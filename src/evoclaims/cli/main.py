@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import atexit
 import contextlib
 import importlib
 import os
@@ -56,16 +57,29 @@ def _ended(arguments: Sequence[str] | None) -> int:
         print(f"evoclaims: {error}", file=sys.stderr)
         return USER_ERROR
     except KeyboardInterrupt:
+        if alone := arguments is None:
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
         runs = getattr(options, "run", True) and not getattr(options, "stored", False)  # `power` alone runs nothing
         trains = options.command in IN_PROCESSES and runs
         goes_on = "; the same command goes on from the last checkpoint" if trains else ""
         print(f"\nevoclaims: interrupted{goes_on}.", file=sys.stderr)
+        if alone:
+            _end_at_the_next()
         return INTERRUPTED
     except Exception as error:
         if sentence := _raised_in_project(error):
             print(f"evoclaims: {sentence}.", file=sys.stderr)
             return USER_ERROR
         raise
+
+
+def _end_at_the_next() -> None:
+    """Let another Ctrl-C end this interrupted process at once; else it is a traceback, or the process ends by a signal.
+
+    As it ends, the interpreter forgets a handler, but not that a signal is ignored.
+    """
+    signal.signal(signal.SIGINT, lambda *_: os._exit(INTERRUPTED))
+    atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)  # when threads are waited for no longer
 
 
 def _raised_in_project(error: Exception) -> str:
