@@ -76,3 +76,21 @@ def test_outside_of_a_project_every_command_says_what_is_missing(
     monkeypatch.chdir(tmp_path_factory.mktemp("elsewhere"))
     for command in COMMANDS.keys() - OF_STORES:
         assert "has a [tool.evoclaims] table" in asked(evoclaims, command)
+
+
+@pytest.mark.parametrize(
+    ("command", "suggested"),
+    [
+        ("reference", "run --tier smoke"),
+        ("export", "run"),
+        ("jobs", "submit"),
+        ("status --variant=traded", "run --variant traded --tier smoke"),
+        ("champion right --on=parity", "run right --on parity --tier smoke --trials 1 --first-seed 0"),
+        ("mutants --stored", "mutants"),
+    ],
+)
+def test_a_suggested_command_takes_the_store_that_was_named(evoclaims: Evoclaims, command: str, suggested: str) -> None:
+    Path("my trials").mkdir()
+    _, out, err = evoclaims(*command.split(), "--storage=my trials")
+    assert f"`evoclaims {suggested} --storage 'my trials'`" in out + err
+    assert ("`pytest -m smoke --claims-storage='my trials'`" in err) == command.startswith("mutants")

@@ -32,7 +32,8 @@ def main(options: argparse.Namespace) -> int:
     rows = export.trial_rows((t for t in trials if options.tier == ALL_TIERS or names.get(t.condition)), names)
     if not rows:
         raise UserError(
-            f"Neither {options.storage} nor the reference trials hold a trial of this tier; `evoclaims run` runs some."
+            f"Neither {options.storage} nor the reference trials hold a trial of this tier; "
+            f"`evoclaims run{project.store.option}` runs some."
         )
     out = Path(options.out or REPORT / f"trials.{options.form}")
     write(out, export.FORMS[options.form](rows), ours=options.out is None)

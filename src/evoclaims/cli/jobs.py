@@ -43,7 +43,7 @@ def main(options: argparse.Namespace) -> int:
     project = open_project(options.storage)
     rows = list(_rows(project))
     if not rows:
-        print(f"No job was submitted for {project.store.root}: `evoclaims submit` does.")
+        print(f"No job was submitted for {project.store.root}: `evoclaims submit{project.store.option}` does.")
         return 0
     for place, state, reason, log in rows:
         more = f": {reason}" * bool(reason) + f" ({log})" * log.exists()
@@ -51,7 +51,9 @@ def main(options: argparse.Namespace) -> int:
     counts = {name: sum(state == name for _, state, *_ in rows) for name in ("queued", "running", "done", "failed")}
     print(", ".join(f"{count} {state}" for state, count in counts.items() if count))
     if counts["failed"]:
-        print("`evoclaims submit` submits what has failed again; it goes on from its checkpoints.")
+        print(
+            f"`evoclaims submit{project.store.option}` submits what has failed again; it goes on from its checkpoints."
+        )
     return int(counts["failed"] > 0)
 
 

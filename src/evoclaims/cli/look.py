@@ -78,7 +78,7 @@ def _champion(options: argparse.Namespace, project: Project) -> tuple[Path, byte
         print(
             f"The share of episodes that reach the goal is {again:g} here, and {recorded:g} in the record: these are "
             f"not quite the episodes that were judged. `evoclaims champion {options.method} --on {options.task} --tier "
-            f"{options.tier} --seed {options.seed}` compares all values."
+            f"{options.tier} --seed {options.seed}{project.store.option}` compares all values."
         )
     return path, data
 

@@ -50,8 +50,8 @@ def main(options: argparse.Namespace) -> int:
     if not any(report.n for report in claims):
         raise UserError(
             f"No claim of the {options.tier} tier is judged yet, so no fault could change a verdict. "
-            f"Judge them with `pytest -m {options.tier}`, or run what is missing with `evoclaims mutants` "
-            "without --stored."
+            f"Judge them with `pytest -m {options.tier}{project.store.pytest_option}`, or run what is missing with "
+            f"`evoclaims mutants{project.store.option}` without --stored."
         )
     mutated = replace(project, reproduction=under_faults(project.reproduction, options.tier, planted))
     reports = mutated.judge_variants([(options.tier, one.name) for one in planted])

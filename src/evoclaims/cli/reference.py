@@ -99,7 +99,7 @@ def main(options: argparse.Namespace) -> int:
         of, named = (f" that {variant} changes", f" --variant {variant}") if variant else ("", "")
         raise UserError(
             f"No {'other ' * bool(shared)}condition of the {options.tier} tier{of} has {smallest} stored trials; run "
-            f"them first with `evoclaims run --tier {options.tier}{named}`."
+            f"them first with `evoclaims run --tier {options.tier}{named}{project.store.option}`."
         )
     return 0
 

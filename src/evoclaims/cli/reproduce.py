@@ -44,7 +44,7 @@ def main(options: argparse.Namespace) -> int:
             selected = f"METHOD --on TASK --tier {options.tier}"
         print(
             f"Nothing could be drawn: of {', '.join(chosen)} no trial of the {options.tier} tier is at hand. "
-            f"`evoclaims run {selected}` runs them."
+            f"`evoclaims run {selected}{project.store.option}` runs them."
         )
     return int(not shown)
 

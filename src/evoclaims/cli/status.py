@@ -45,7 +45,7 @@ def main(options: argparse.Namespace) -> int:
             raise UserError(
                 f"None of these claims of the {options.tier} tier is judged under {options.variant}: it "
                 "changes none of their trials, or they have not run. Run what is missing with `evoclaims "
-                f"run --variant {options.variant} --tier {options.tier}`."
+                f"run --variant {options.variant} --tier {options.tier}{project.store.option}`."
             )
     if options.form is None:
         _print(reports, options.tier, options.why)

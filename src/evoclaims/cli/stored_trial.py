@@ -66,7 +66,8 @@ def load(project: Project, tier: str, method: str, task: str, seed: int) -> Stor
         takes = "" if cost.basis == "budget" else f", in about {duration(cost.seconds())}"
         raise UserError(
             f"{store.root} holds no trial of {title} with seed {seed}, and no champion of it is committed. "
-            f"`evoclaims run {method} --on {task} --tier {tier} --trials 1 --first-seed {seed}` runs it{takes}."
+            f"`evoclaims run {method} --on {task} --tier {tier} --trials 1 --first-seed {seed}{store.option}` runs "
+            f"it{takes}."
         )
     return Stored(title, condition, result, champion_replay.load(store, condition, result), store.champion_file(result))
 

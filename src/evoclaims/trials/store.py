@@ -57,6 +57,18 @@ class DamagedFileError(StorageError):
 class Store(StoreFiles):
     """Trials in one folder; making a `Store` touches no file, so a read-only one can be read."""
 
+    @property
+    def option(self) -> str:
+        """The option with which a suggested command takes this store; empty for the usual one from here."""
+        here = Path.cwd()
+        usual = [above / DEFAULT_ROOT for above in (here, *here.parents)]
+        return "" if Path(os.path.abspath(self.root)) in usual else f" --storage {shlex.quote(str(self.root))}"
+
+    @property
+    def pytest_option(self) -> str:
+        """The same for pytest, which would take a folder after a space for one of tests."""
+        return self.option.replace(" --storage ", " --claims-storage=", 1)
+
     def champion_file(self, result: TrialResult) -> Path:
         """Return the file of the champion that a record of this store names."""
         spare = self.spare_champion_path(result.id, result.champion)
@@ -288,9 +300,7 @@ class Store(StoreFiles):
 def _storage_of(path: Path) -> str:
     """Return the option with which a command uses the store that a file is in; empty for the usual store from here."""
     root = next((above.parent for above in path.parents if above.name in ("trials", "champions", "checkpoints")), None)
-    here = Path.cwd()
-    usual = [above / DEFAULT_ROOT for above in (here, *here.parents)]
-    return "" if root is None or Path(os.path.abspath(root)) in usual else f" --storage {shlex.quote(str(root))}"
+    return "" if root is None else Store(root).option
 
 
 def gives_way(present: TrialResult, result: TrialResult) -> bool:
