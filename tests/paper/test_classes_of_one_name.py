@@ -86,3 +86,11 @@ def test_trials_of_a_class_that_was_renamed_are_named(made: Any) -> None:
     renamed = replace(trial, provenance={"code_hashes": {"old_place.Searcher": SEARCHER.code[name]}})
     assert SEARCHER.edited_since([trial, renamed]) == (name,)
     assert SEARCHER.edited_since([replace(trial, provenance={})]) == ()  # nothing is known
+
+
+def test_two_conditions_never_share_a_file_of_reference_trials() -> None:
+    one, other = ("ppo", "long-maze"), ("ppo-long", "maze")
+    kept = _condition(RandomSearch(2, network=NETWORK))
+    for conditions in ({one: kept, other: kept}, {other: kept, one: kept}):
+        with pytest.raises(UserError, match=r"would have one file of reference trials, ppo-long-maze\.jsonl\. Write"):
+            Reproduction("ours", "Ours", Path(), {"smoke": Tier(conditions, FIXED_10)})

@@ -202,3 +202,15 @@ def test_an_imported_trial_that_ended_early_is_not_advised_to_be_run_otherwise(
     assert verdict.reason.endswith(
         "nobody knows when it would have reached that: ask for a value that ended trials have reached"
     )
+
+
+def test_an_imported_curve_with_an_empty_cell_is_said_to_lack_a_number(
+    imported: Callable[[Sequence[int]], TrialGroup],
+) -> None:
+    group = imported([100, 950, 1000])
+    path = group.condition.folder / group.condition.path
+    path.write_text(path.read_text().replace("0,100,1\n", "0,100,\n", 1))
+    measure = replace(group, condition=replace(group.condition)).steps_to("return", 5)
+    verdict = judge(measure < 960, Design.fixed(10))
+    assert verdict.outcome is Outcome.ERROR
+    assert verdict.reason.startswith("A row of the table has no 'return' for the finished trial of seed 0 (id ")

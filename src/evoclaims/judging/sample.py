@@ -135,7 +135,7 @@ def _checked(trial: TrialResult) -> TrialResult:
         trial,
         metrics=_Numbers(trial.metrics, where, of_metrics),
         levels=_Numbers(trial.levels, where, of_levels),
-        curves=_Numbers(trial.curves, where),
+        curves=_Numbers(trial.curves, where, "A row of the table has no" if "imported" in trial.spec else ""),
     )
 
 

@@ -175,7 +175,7 @@ class Reproduction:
 
     Raises:
         UserError: when `trials` is not such a class, the folder is not a `pathlib.Path`, or conditions of different
-            classes have one id.
+            classes have one id, or two have one file of reference trials.
     """
 
     name: str
@@ -220,7 +220,9 @@ class Reproduction:
         }
         object.__setattr__(self, "variants", variants)
         of_tiers = [tier.conditions for tier in tiers.values()]
-        _check_classes([*of_tiers, *(these for one in variants.values() for these in one.conditions.values())])
+        every = [*of_tiers, *(these for one in variants.values() for these in one.conditions.values())]
+        _check_files(every)
+        _check_classes(every)
 
     def _found(self, conditions: Conditions) -> dict[Names, Condition]:
         """Return conditions whose tables are looked for in the reproduction's folder."""
@@ -279,6 +281,23 @@ class Reproduction:
     def references_of(self, variant: str) -> Path:
         """The folder of the reference trials that only a variant has; without a name, of the protocol's."""
         return self.references / "variants" / variant if variant else self.references
+
+
+def _check_files(several: Iterable[Conditions]) -> None:
+    """Refuse two conditions with one file of reference trials: the second would be written over the first.
+
+    Raises:
+        UserError: naming both.
+    """
+    for conditions in several:
+        known: dict[str, Names] = {}
+        for names in conditions:
+            first = known.setdefault("-".join(names), names)
+            if first != names:
+                raise UserError(
+                    f"{' on '.join(first)} and {' on '.join(names)} would have one file of reference trials, "
+                    f"{'-'.join(names)}.jsonl. Write another name of a method or a task."
+                )
 
 
 def _check_classes(several: Iterable[Conditions]) -> None:

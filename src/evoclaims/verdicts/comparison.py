@@ -51,7 +51,7 @@ class Side:
         return replace(
             self,
             verdicts={key: standing for key, standing in self.verdicts.items() if key[0] in kept},
-            trials={name: trials for name, trials in self.trials.items() if PurePosixPath(name).parent.name in kept},
+            trials={name: trials for name, trials in self.trials.items() if _tier_of(name) in kept},
         )
 
 
@@ -144,6 +144,12 @@ def version_changes(old: Side, new: Side) -> list[str]:
         if change:
             found[change].append(name)
     return [f"versions changed: {change}: {listed(names)}" for change, names in found.items()]
+
+
+def _tier_of(name: str) -> str:
+    """Return the tier of a condition's name; a task's own name may have slashes, such as "ALE/Pong-v5"."""
+    folders = PurePosixPath(name).parts
+    return folders[2] if folders[0] == "variants" else folders[0]
 
 
 def _named(path: PurePosixPath | Path) -> str:
