@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from evoclaims import TrainingLoop
-from evoclaims.core.source_code import code_of
+from evoclaims.core.source_code import ARRAYS, code_of, is_edited
 from evoclaims.envs import NParity
 from evoclaims.methods import HandBuilt
 
@@ -140,6 +140,23 @@ def test_what_is_named_through_several_modules_is_part_of_it(found: Found) -> No
 def test_lists_and_tables_of_constants_are_part_of_it(found: Found, table: str) -> None:
     one, other = (found("RATE = 0.5", f"RATE = {table.format(value)}") for value in (1, 2))
     assert one["its_method.Own"] != other["its_method.Own"]
+
+
+@pytest.mark.parametrize(
+    "table", ["jax.numpy.array([0.5, {0}])", "__import__('numpy').int64({0})", "[0.5, {{'rate': jax.numpy.ones({0})}}]"]
+)
+def test_arrays_are_part_of_it_which_records_of_older_releases_do_not_have(found: Found, table: str) -> None:
+    one, same, other = (found("RATE = 0.5", f"RATE = {table.format(value)}")["its_method.Own"] for value in (1, 1, 2))
+    assert one == same != other
+    assert is_edited(one, other)
+    assert is_edited(None, one)
+    assert not is_edited(one.partition(ARRAYS)[0], other)
+
+
+def test_the_last_bits_of_an_array_are_no_edit(found: Found) -> None:
+    tables = ("jax.numpy.array([0.1, 0.3, 0.0])", "jax.numpy.array([0.1, 0.3 + 3e-8, -1e-17])")
+    one, other = (found("RATE = 0.5", f"RATE = {table}") for table in tables)
+    assert one == other
 
 
 def test_the_base_of_a_part_is_part_of_it(found: Found) -> None:

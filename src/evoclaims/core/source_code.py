@@ -14,6 +14,8 @@ from textwrap import dedent
 from types import ModuleType
 from typing import Any, Final
 
+import numpy as np
+
 from evoclaims.core.canonical import content_hash, is_own
 from evoclaims.core.errors import PACKAGE_FOLDERS
 from evoclaims.core.foreign import Later
@@ -23,6 +25,9 @@ CODE: Final = "code_hashes"
 
 DIGITS: Final = 16
 """Of a hash that are kept."""
+
+ARRAYS: Final = ":"
+"""Between a hash and that of the arrays that the code names, if there are any."""
 
 _IN_THE_ID: Final = ("name", "revision", "packages")
 """Class variables of a method or task that its trials' ids or versions hold."""
@@ -38,13 +43,18 @@ def code_of(*components: Any) -> dict[str, str]:
     """Return hashes of the code of components and of the parts in their fields, by "module.Class".
 
     Classes of this package and of installed ones are left out: trials record their versions. A hash is of the class,
-    its bases, and the functions, classes and constants that these name, directly or through each other. Comments,
-    docstrings, layout and what ids hold anyhow (values of fields, `revision`) do not count. What is reached in other
-    ways, such as by the attribute of an object, is not seen.
+    its bases, and the functions, classes, constants and arrays that these name, directly or through each other.
+    Comments, docstrings, layout and what ids hold anyhow (values of fields, `revision`) do not count. What is reached
+    in other ways, such as by the attribute of an object, is not seen.
     """
     code = {one for component in components for one in _code(component)}
     found = {f"{one.__module__}.{one.__qualname__}": _hash(one) for one in code if _is_the_projects(one)}
     return {name: found[name] for name in sorted(found)}
+
+
+def is_edited(then: str | None, now: str) -> bool:
+    """Whether a recorded hash is of other code than a hash of now; older records say nothing about arrays."""
+    return then not in (now, now.partition(ARRAYS)[0])
 
 
 def _code(component: Any) -> Iterator[Any]:
@@ -101,6 +111,7 @@ def _is_the_projects(one: Any) -> bool:
 def _hash(code: Any) -> str:
     """Return a hash of the code of a class or function and of all of the project's that it names."""
     found: dict[str, Any] = {}
+    arrays: dict[str, Any] = {}
     held = [code]
     while held:
         one = _bare(held.pop())
@@ -118,9 +129,11 @@ def _hash(code: Any) -> str:
         for word, value in _named(tree, vars(sys.modules.get(one.__module__, one))):
             if _is_constant(value):
                 found[f"{name}: {word}"] = repr(value)
+            elif (numbers := _numbers(value)) is not None:
+                arrays[f"{name}: {word}"] = numbers
             else:
                 held.append(value)
-    return content_hash(found)[:DIGITS]
+    return content_hash(found)[:DIGITS] + (ARRAYS + content_hash(arrays)[:DIGITS] if arrays else "")
 
 
 def _bare(one: Any) -> Any:
@@ -140,6 +153,32 @@ def _is_constant(value: Any) -> bool:
     if isinstance(value, tuple | list):
         return all(map(_is_constant, value))
     return value is None or isinstance(value, bool | int | float | str)
+
+
+def _numbers(value: Any) -> Any:
+    """Return what an array, or a tuple, list or table with arrays in it, holds; None for other things.
+
+    Rounded: another machine or release may compute the same array with other last bits.
+    """
+    if isinstance(value, dict | tuple | list):
+        held = [*value, *value.values()] if isinstance(value, dict) else value
+        parts = [repr(one) if _is_constant(one) else _numbers(one) for one in held]
+        return None if None in parts else parts
+    if isinstance(value, type | ModuleType):  # to ask one that is imported later would import it
+        return None
+    try:
+        if not (hasattr(value, "dtype") and hasattr(value, "__array__")):
+            return None
+        array = np.asarray(value)
+        shape, largest = [*array.shape], 1.0
+        if array.dtype.kind not in "biuSU":
+            array = array.astype(complex)
+            largest = float(np.abs(array[np.isfinite(array)]).max(initial=0.0))
+            with np.errstate(all="ignore"):
+                array = np.round(array / (largest or 1.0), 6) + 0.0  # no -0.0
+        return [f"{largest:.6g}", shape, repr(array.tolist())]
+    except Exception:  # of objects, a key of jax, or what answers no questions
+        return None
 
 
 def _tree(one: Any) -> ast.Module:
