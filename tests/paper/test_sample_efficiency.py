@@ -21,6 +21,7 @@ from evoclaims.judging.sample import UnreadableTrialError
 from evoclaims.judging.verdict import Outcome
 from evoclaims.judging.window import Window
 from evoclaims.methods.hand_built import HandBuilt
+from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.paper.trial_group import TrialGroup
 from evoclaims.trials.imported import Imported
 from evoclaims.trials.result import TrialResult
@@ -214,3 +215,20 @@ def test_an_imported_curve_with_an_empty_cell_is_said_to_lack_a_number(
     verdict = judge(measure < 960, Design.fixed(10))
     assert verdict.outcome is Outcome.ERROR
     assert verdict.reason.startswith("A row of the table has no 'return' for the finished trial of seed 0 (id ")
+
+
+@pytest.mark.parametrize(("every", "reached"), [(1, 40), (10, 40), (20, 40), (30, None), (40, None)])
+def test_a_loop_that_reports_more_seldom_than_its_budget_says_is_no_slower_one(every: int, reached: int | None) -> None:
+    budget = Budget(environment_steps=120, reports=12)
+    loop = TrainingLoop("its_loops:train", packages=())
+    condition = Condition(loop, PLAIN.task, "whole_budget", budget)
+    steps = [float(step) for step in range(every, 121, every)]
+    fitness, level = [float(step >= 31) for step in steps], [LAST] * len(steps)
+    trial = made(condition, {"environment_steps": steps, "fitness": fitness, "level": level})
+    trials = TrialGroup("its", "small", condition, lambda asked, seeds: [trial])
+    measure = trials.steps_to("fitness", 1)
+    if reached is None:
+        with pytest.raises(UnreadableTrialError, match=r"reports nothing between \d+ and \d+ environment steps"):
+            measure.of(trial)
+    else:
+        assert measure.of(trial) == reached

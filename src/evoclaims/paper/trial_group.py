@@ -45,6 +45,7 @@ def steps_to(source: Source, condition: Condition, curve: str, value: float, lev
     budget = float(condition.environment_steps)
     imported = bool(condition.existing)
     advice = "" if imported else "give the condition the progression 'whole_budget', or "
+    every = max(condition.report_distance, 1)
     name = f"environment steps until {curve} is {float(value):.12g}" + f" on level {wanted}" * (levels > 1)
 
     def read(trial: TrialResult) -> float:
@@ -60,6 +61,13 @@ def steps_to(source: Source, condition: Condition, curve: str, value: float, lev
                 f"{max(steps, default=0.0):,.12g} of {budget:,.12g} environment steps with {curve!r} below {value:g}, "
                 "and nobody knows when it would have reached that: "
                 f"{advice}ask for a value that ended trials have reached"
+            )
+        before = max((at for at in steps if at < first), default=0.0)
+        if condition.loop and first - before > 2 * every and not math.isinf(first):  # it reports when it likes
+            raise UnreadableTrialError(
+                f"The trial of seed {trial.seed_in_words} of {source.label} reports nothing between {before:,.12g} and "
+                f"{first:,.12g} environment steps, where {curve!r} reaches {value:g}, and its budget has reports "
+                f"{every:,} apart: call report(...) as often, or give all compared conditions fewer reports"
             )
         return first
 
