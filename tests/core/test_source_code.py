@@ -143,9 +143,16 @@ def test_lists_and_tables_of_constants_are_part_of_it(found: Found, table: str) 
 
 
 @pytest.mark.parametrize(
-    "table", ["jax.numpy.array([0.5, {0}])", "__import__('numpy').int64({0})", "[0.5, {{'rate': jax.numpy.ones({0})}}]"]
+    "table",
+    [
+        "jax.numpy.array([0.5, {0}])",
+        "__import__('numpy').int64({0})",
+        "[0.5, {{'rate': jax.numpy.ones({0})}}]",
+        "CmaEs({0}0)",
+        "frozenset([{0}])",
+    ],
 )
-def test_arrays_are_part_of_it_which_records_of_older_releases_do_not_have(found: Found, table: str) -> None:
+def test_arrays_and_objects_are_part_of_it_and_records_of_older_releases_lack_them(found: Found, table: str) -> None:
     one, same, other = (found("RATE = 0.5", f"RATE = {table.format(value)}")["its_method.Own"] for value in (1, 1, 2))
     assert one == same != other
     assert is_edited(one, other)

@@ -16,7 +16,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from evoclaims.core.canonical import content_hash, is_own
+from evoclaims.core.canonical import as_plain, content_hash, is_own
 from evoclaims.core.errors import PACKAGE_FOLDERS
 from evoclaims.core.foreign import Later
 
@@ -27,7 +27,7 @@ DIGITS: Final = 16
 """Of a hash that are kept."""
 
 ARRAYS: Final = ":"
-"""Between a hash and that of the arrays that the code names, if there are any."""
+"""Between a hash and that of the arrays, sets and dataclasses that the code names, if there are any."""
 
 _IN_THE_ID: Final = ("name", "revision", "packages")
 """Class variables of a method or task that its trials' ids or versions hold."""
@@ -43,9 +43,9 @@ def code_of(*components: Any) -> dict[str, str]:
     """Return hashes of the code of components and of the parts in their fields, by "module.Class".
 
     Classes of this package and of installed ones are left out: trials record their versions. A hash is of the class,
-    its bases, and the functions, classes, constants and arrays that these name, directly or through each other.
-    Comments, docstrings, layout and what ids hold anyhow (values of fields, `revision`) do not count. What is reached
-    in other ways, such as by the attribute of an object, is not seen.
+    its bases, and the functions, classes, constants, arrays, sets and dataclasses that these name, directly or through
+    each other. Comments, docstrings, layout and what ids hold anyhow (values of fields, `revision`) do not count. What
+    is reached in other ways, such as by the attribute of an object, is not seen.
     """
     code = {one for component in components for one in _code(component)}
     found = {f"{one.__module__}.{one.__qualname__}": _hash(one) for one in code if _is_the_projects(one)}
@@ -53,7 +53,7 @@ def code_of(*components: Any) -> dict[str, str]:
 
 
 def is_edited(then: str | None, now: str) -> bool:
-    """Whether a recorded hash is of other code than a hash of now; older records say nothing about arrays."""
+    """Whether a recorded hash is of other code than one of now; older records say nothing about arrays and the like."""
     return then not in (now, now.partition(ARRAYS)[0])
 
 
@@ -156,18 +156,21 @@ def _is_constant(value: Any) -> bool:
 
 
 def _numbers(value: Any) -> Any:
-    """Return what an array, or a tuple, list or table with arrays in it, holds; None for other things.
+    """Return what an array, a set or a dataclass holds, or a tuple, list or table with these in it; None for others.
 
-    Rounded: another machine or release may compute the same array with other last bits.
+    Arrays are rounded: another machine or release may compute the same array with other last bits.
     """
-    if isinstance(value, dict | tuple | list):
-        held = [*value, *value.values()] if isinstance(value, dict) else value
-        parts = [repr(one) if _is_constant(one) else _numbers(one) for one in held]
-        return None if None in parts else parts
-    if isinstance(value, type | ModuleType):  # to ask one that is imported later would import it
-        return None
     try:
-        if not (hasattr(value, "dtype") and hasattr(value, "__array__")):
+        if dataclasses.is_dataclass(value) and not isinstance(value, type):
+            return as_plain(value)  # as ids have it: a field that a release adds is no edit
+        if isinstance(value, set | frozenset) and all(map(_is_constant, value)):
+            value = sorted(map(repr, value))
+        if isinstance(value, dict | tuple | list):
+            each = [*value, *value.values()] if isinstance(value, dict) else value
+            parts = [repr(one) if _is_constant(one) else _numbers(one) for one in each]
+            return None if None in parts else parts
+        # To ask a module that is imported later would import it.
+        if isinstance(value, type | ModuleType) or not (hasattr(value, "dtype") and hasattr(value, "__array__")):
             return None
         array = np.asarray(value)
         shape, largest = [*array.shape], 1.0
