@@ -129,8 +129,8 @@ def _hash(code: Any) -> str:
         for word, value in _named(tree, vars(sys.modules.get(one.__module__, one))):
             if _is_constant(value):
                 found[f"{name}: {word}"] = repr(value)
-            elif (numbers := _numbers(value)) is not None:
-                arrays[f"{name}: {word}"] = numbers
+            elif (contents := _contents(value)) is not None:
+                arrays[f"{name}: {word}"] = contents
             else:
                 held.append(value)
     return content_hash(found)[:DIGITS] + (ARRAYS + content_hash(arrays)[:DIGITS] if arrays else "")
@@ -155,7 +155,7 @@ def _is_constant(value: Any) -> bool:
     return value is None or isinstance(value, bool | int | float | str)
 
 
-def _numbers(value: Any) -> Any:
+def _contents(value: Any) -> Any:
     """Return what an array, a set or a dataclass holds, or a tuple, list or table with these in it; None for others.
 
     Arrays are rounded: another machine or release may compute the same array with other last bits.
@@ -167,7 +167,7 @@ def _numbers(value: Any) -> Any:
             value = sorted(map(repr, value))
         if isinstance(value, dict | tuple | list):
             each = [*value, *value.values()] if isinstance(value, dict) else value
-            parts = [repr(one) if _is_constant(one) else _numbers(one) for one in each]
+            parts = [repr(one) if _is_constant(one) else _contents(one) for one in each]
             return None if None in parts else parts
         # To ask a module that is imported later would import it.
         if isinstance(value, type | ModuleType) or not (hasattr(value, "dtype") and hasattr(value, "__array__")):
