@@ -111,6 +111,7 @@ def test_trials_of_a_killed_night_do_not_count_once_their_code_is_edited(
     assert status == 0
     assert "Trials up to seed 10001 ran before tiny_paper.Coin was edited or renamed: they do not count" in out
     assert "Trials up to seed 10002 ran before tiny_paper.Coin was edited" in out
+    assert "Edited or renamed since the committed trials: tiny_paper.Coin. A change may come of that" in out
     assert "seeds 10003 to 10004 of 1 condition.\nAlarm at an evidence of 20 (1 family / α 0.05)." in out
     assert [night.seeds for night in load(FILE)[1]] == [(10_003, 10_004)]
 

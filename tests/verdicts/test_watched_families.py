@@ -25,7 +25,7 @@ TASKS = ("a", "b", "c", "d", "e")
 
 
 def condition(method: str, task: str, values: Any, measure: str = "score", seeds: tuple[int, ...] = SEEDS) -> Watched:
-    made: Any = SimpleNamespace(id=f"{method}-{task}", packages=("evosax", "numpy"))
+    made: Any = SimpleNamespace(id=f"{method}-{task}", packages=("evosax", "numpy"), edited_since=lambda _: ())
     return Watched(
         (method, task), made, seeds, {measure: tuple(map(float, values))}, {"evosax": "1", "numpy": "2"}, ("cpu",)
     )

@@ -226,6 +226,11 @@ def _sentences(
     ]
     if lacking:
         lines.append(f"Not watched, since some reference trials lack it: {', '.join(lacking)}.")
+    if edited := sorted({name for one in watch.conditions for name in one.edited}):
+        lines.append(
+            f"Edited or renamed since the committed trials: {', '.join(edited)}. A change may come of that, not of "
+            "versions, until `evoclaims reference` writes new ones."
+        )
     if gone:
         lines.append(
             f"No longer watched, since no claim reads it: {', '.join(gone)}. If this is meant, begin a new series with "

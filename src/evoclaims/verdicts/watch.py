@@ -56,6 +56,7 @@ class Watched:
         versions: of the packages that they were made with.
         devices: kinds of those that made them, in alphabetical order.
         lacking: seeds of the reference trials that lack a measure of the others, by the measure, which is not watched.
+        edited: the project's classes that some of the committed trials ran otherwise, or under another name.
     """
 
     names: Names
@@ -65,6 +66,7 @@ class Watched:
     versions: Versions
     devices: tuple[str, ...]
     lacking: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+    edited: tuple[str, ...] = ()
 
     @property
     def label(self) -> str:
@@ -133,7 +135,9 @@ def watched(
     known = references.measures(done, {name for one in done for name in reads(one)})
     without = {name: tuple(one.seed for one in done if not _has(one, name)) for name in known}
     lacking = {name: seeds for name, seeds in without.items() if 0 < len(seeds) < len(done)}
-    return Watched(names, condition, tuple(sorted(every)), values, versions, devices, lacking) if values else None
+    edited = condition.edited_since(every.values())
+    found = Watched(names, condition, tuple(sorted(every)), values, versions, devices, lacking, edited)
+    return found if values else None
 
 
 def kinds_of(trials: Iterable[TrialResult]) -> tuple[str, ...]:
