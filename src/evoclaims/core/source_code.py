@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import dataclasses
+import hashlib
 import inspect
 import sys
 import sysconfig
@@ -53,7 +54,7 @@ def code_of(*components: Any) -> dict[str, str]:
 
 
 def is_edited(then: str | None, now: str) -> bool:
-    """Whether a recorded hash is of other code than one of now; older records say nothing about arrays and the like."""
+    """Whether a recorded hash is of other code than the present one; older records have no part for arrays."""
     return then not in (now, now.partition(ARRAYS)[0])
 
 
@@ -179,7 +180,7 @@ def _contents(value: Any) -> Any:
             largest = float(np.abs(array[np.isfinite(array)]).max(initial=0.0))
             with np.errstate(all="ignore"):
                 array = np.round(array / (largest or 1.0), 6) + 0.0  # no -0.0
-        return [f"{largest:.6g}", shape, repr(array.tolist())]
+        return [f"{largest:.6g}", shape, hashlib.sha256(array.tobytes()).hexdigest()]  # a whole data set may be named
     except Exception:  # of objects, a key of jax, or what answers no questions
         return None
 

@@ -13,6 +13,7 @@ from evoclaims.core.errors import UnknownNameError, UserError, require_known
 from evoclaims.core.tiers import TIERS
 from evoclaims.judging.design import Design
 from evoclaims.judging.exact import MAX_TRIALS
+from evoclaims.paper.references import path_of
 from evoclaims.paper.reported import FILE, Published, load_published
 from evoclaims.paper.trial_group import TrialGroup
 from evoclaims.trials.imported import Imported
@@ -290,13 +291,14 @@ def _check_files(several: Iterable[Conditions]) -> None:
         UserError: naming both.
     """
     for conditions in several:
-        known: dict[str, Names] = {}
+        known: dict[Path, Names] = {}
         for names in conditions:
-            first = known.setdefault("-".join(names), names)
+            path = path_of(Path(), "", *names)
+            first = known.setdefault(path, names)
             if first != names:
                 raise UserError(
-                    f"{' on '.join(first)} and {' on '.join(names)} would have one file of reference trials, "
-                    f"{'-'.join(names)}.jsonl. Write another name of a method or a task."
+                    f"{' on '.join(first)} and {' on '.join(names)} would have one file of reference trials, {path}. "
+                    "Write another name of a method or a task."
                 )
 
 

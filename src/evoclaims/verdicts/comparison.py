@@ -35,7 +35,7 @@ class Side:
         trials: by condition.
         troubles: a line for each file that could not be read.
         reads: what claims read of each trial, by condition, where that is known.
-        methods: by condition, where they are known: with that of another tier or variant none is tested jointly.
+        methods: by condition, below its tier and variant, for a store. Conditions of one method are tested jointly.
     """
 
     name: str
@@ -115,7 +115,7 @@ def _judged(archive: Archive, trials: Mapping[str, Versions]) -> Iterator[TrialR
 def compare_trials(old: Side, new: Side) -> tuple[DriftReport, DigestCheck]:
     """Check the conditions that both sides have for drift, and CPU trials for bit-identical results.
 
-    The new side is a store's, whose methods are known: in the name of a file, "my-a-parity", none is.
+    The new side is a store's: a file's name, such as "my-a-parity", does not say where the method ends.
     """
     both = sorted(name for name in old.trials.keys() & new.trials.keys() if new.trials[name])
     return references.compare(
