@@ -12,13 +12,10 @@ from jaxtyping import Array, Bool, Float, Int
 from evoclaims.core.foreign import implicit_promotions
 from evoclaims.core.pytree import pytree
 from evoclaims.envs.ecorobot.constraints import cholesky_solve, constrained_acceleration
-from evoclaims.envs.ecorobot.contact_frames import as_in_c
+from evoclaims.envs.ecorobot.contacts import with_contacts
 from evoclaims.envs.ecorobot.pose import torso
 from evoclaims.envs.ecorobot.scene import GEOMS, Places, Scene, box_geoms, mjx, on_device
-from evoclaims.kernels import seldom
 
-APART: Final = 1.0
-"""Distance of contacts that do not touch, m."""
 LARGEST: Final = 1e10
 """MuJoCo's limit for valid numbers (mjMAXVAL)."""
 
@@ -91,10 +88,7 @@ def _accelerated(scene: Scene, model: Any, data: Any, body: Body) -> tuple[Array
     data = mjx.kinematics(model, data)
     data = mjx.com_pos(model, data)
     data = mjx.crb(model, data)
-    data = mjx.collision(model, data)
-    if not scene.robot.is_built_in:
-        data = as_in_c(jnp.asarray(scene.model.geom_type), model, data)
-    data = _seldom_crowded(data, scene.robot.touching)
+    data = with_contacts(scene, model, data)
     data = mjx.make_constraint(model, data)
     data = mjx.transmission(model, data)
     data = mjx.fwd_velocity(model, data)
@@ -131,18 +125,6 @@ def _runge_kutta(scene: Scene, model: Any, data: Any, body: Body) -> Body:
     start = (jnp.int32(0), body.velocity, body.acceleration, none, none)
     _, _, last, velocity, acceleration = jax.lax.scan(stage, start, None, length=4)[0]
     return Body(moved(velocity), body.velocity + model.opt.timestep * acceleration, last)
-
-
-def _seldom_crowded(data: Any, usual: int) -> Any:
-    """Tell kernels that seldom more than `usual` contacts touch.
-
-    Where there are more than it keeps, MJX keeps the deepest, in order. Those that do not touch have no force, however
-    far apart they are.
-    """
-    contact = data._impl.contact
-    gap = contact.dist - contact.includemargin
-    later = jnp.where(seldom(gap[usual:] < 0.0), contact.dist[usual:], contact.includemargin[usual:] + APART)
-    return data.tree_replace({"_impl.contact.dist": contact.dist.at[usual:].set(later)})
 
 
 def _nearest(scene: Scene, model: Any, body: Body, places: Places) -> Int[Array, " near"]:
