@@ -16,25 +16,32 @@ SMALL = 3
 
 
 def cholesky_solve(matrix: Float[Array, "n n"], right: Float[Array, " n"]) -> Float[Array, " n"]:
-    """Solve a symmetric positive definite system."""
+    """Solve a symmetric positive definite system.
+
+    Beyond three equations from last to first: a robot's limbs come last, each of which is coupled with the torso
+    alone, and eliminated first they leave the zeros between them as they are.
+    """
     n = right.shape[0]
     if n > SMALL:
-        return jax.scipy.linalg.cho_solve(jax.scipy.linalg.cho_factor(matrix), right)
+        factor = jax.scipy.linalg.cho_factor(matrix[::-1, ::-1], lower=True)
+        solution: Array = jax.scipy.linalg.cho_solve(factor, right[::-1])[::-1]
+        return solution
     lower: list[list[Array]] = []
+    inverse: list[Array] = []  # of the diagonal: many are divided by each
     for i in range(n):
         row: list[Array] = []
-        for j in range(i + 1):
-            rest = matrix[i, j] - sum((row[k] * (row if j == i else lower[j])[k] for k in range(j)), jnp.zeros(()))
-            row.append(jnp.sqrt(rest) if j == i else rest / lower[j][j])
+        for j in range(i):
+            row.append((matrix[i, j] - sum((row[k] * lower[j][k] for k in range(j)), jnp.zeros(()))) * inverse[j])
+        inverse.append(1.0 / jnp.sqrt(matrix[i, i] - sum((x * x for x in row), jnp.zeros(()))))
         lower.append(row)
     forward: list[Array] = []
     for i in range(n):
-        forward.append((right[i] - sum((lower[i][k] * forward[k] for k in range(i)), jnp.zeros(()))) / lower[i][i])
-    solution: list[Array] = [jnp.zeros(())] * n
+        forward.append((right[i] - sum((lower[i][k] * forward[k] for k in range(i)), jnp.zeros(()))) * inverse[i])
+    backward: list[Array] = [jnp.zeros(())] * n
     for i in reversed(range(n)):
-        rest = forward[i] - sum((lower[k][i] * solution[k] for k in range(i + 1, n)), jnp.zeros(()))
-        solution[i] = rest / lower[i][i]
-    return jnp.stack(solution)
+        rest = forward[i] - sum((lower[k][i] * backward[k] for k in range(i + 1, n)), jnp.zeros(()))
+        backward[i] = rest * inverse[i]
+    return jnp.stack(backward)
 
 
 def constrained_acceleration(

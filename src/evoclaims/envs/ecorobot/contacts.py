@@ -8,7 +8,7 @@ limb has a place of its own among them, its body is known while tracing, and so 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import jax
@@ -44,16 +44,20 @@ class Pairs:
 
     Attributes:
         distance: less than 0 where they touch, m.
-        place: between the surfaces, in the middle.
-        normal: from the first geom to the second.
+        point: from which the contact is offset along the normal by `offset` and a `share` of the distance.
+        offset: m.
+        share: a half or nothing.
+        towards: from the first geom to the second, of any length.
         axis: along which the friction pyramid lies; 0 where only the normal decides.
         geoms: MuJoCo's ids, known while tracing.
         surfaces: each array of `FIELDS`.
     """
 
     distance: Array
-    place: Array
-    normal: Array
+    point: Array
+    offset: Array
+    share: Array
+    towards: Array
     axis: Array
     geoms: NDArray[np.int64]
     surfaces: dict[str, Array]
@@ -85,48 +89,58 @@ def _found(scene: Scene, model: Any, data: Any) -> dict[int, Pairs]:
     """Return the contacts of all pairs that could touch, by the dimension of their friction."""
     parts: dict[int, list[Pairs]] = {}
     known = _driver._geom_groups(scene.model)
-    for (key, pairs), shared in zip(known.items(), _driver._contact_groups(model, data).values(), strict=True):
-        ids = np.array(pairs)[:, :2]
-        distance, place, normal = _touch(key, ids, model, data)
-        each = len(distance) // len(ids)
-        ids = np.repeat(ids, each, axis=0)
-        axis = jnp.zeros_like(normal)
-        if tuple(map(int, key.types)) == (PLANE, CAPSULE):
-            axis = data.geom_xmat[ids[:, 1]][:, :, 2]
-        ours, others = scene.model.geom_bodyid[ids.T] > 0
-        turned = ours & ~others  # the world's comes first, so that limbs have their places
-        parts.setdefault(key.condim, []).append(
-            Pairs(
-                distance,
-                place,
-                jnp.where(turned[:, None], -normal, normal),
-                axis,
-                np.where(turned[:, None], ids[:, ::-1], ids),
-                {name: jnp.repeat(getattr(shared, name), each, axis=0) for name in FIELDS},
-            )
-        )
+    for (key, geoms), shared in zip(known.items(), _driver._contact_groups(model, data).values(), strict=True):
+        pairs = _of_spheres(key, np.array(geoms)[:, :2], model, data) or _by_mjx(key, np.array(geoms)[:, :2], model, data)
+        each = len(pairs.geoms) // len(geoms)
+        surfaces = {name: jnp.repeat(getattr(shared, name), each, axis=0) for name in FIELDS}
+        parts.setdefault(key.condim, []).append(_from_the_world(scene, replace(pairs, surfaces=surfaces)))
     return {dimension: _together(pairs) for dimension, pairs in parts.items()}
+
+
+def _of_spheres(key: Any, geoms: NDArray[np.int64], model: Any, data: Any) -> Pairs | None:
+    """Return the contacts of spheres with planes, boxes or capsules, as C computes them; None for other types."""
+    types = tuple(map(int, key.types))
+    nearest = {(PLANE, SPHERE): _to_plane, (SPHERE, BOX): _to_box, (SPHERE, CAPSULE): _to_capsule}.get(types)
+    if nearest is None:
+        return None
+    geoms = geoms if types[0] == SPHERE else geoms[:, ::-1]
+    sphere, other = geoms.T
+    centre, radius = data.geom_xpos[sphere], model.geom_size[sphere][:, 0]
+    gap, towards = nearest(centre - data.geom_xpos[other], data.geom_xmat[other], model.geom_size[other])
+    half, none = jnp.full_like(radius, 0.5), jnp.zeros_like(centre)
+    return Pairs(gap - radius, centre, radius, half, towards, none, geoms, {})
+
+
+def _by_mjx(key: Any, geoms: NDArray[np.int64], model: Any, data: Any) -> Pairs:
+    """Return the contacts that MJX computes, one or more for each pair in turn."""
+    distance, place, frame = _driver._COLLISION_FUNC[key.types](model, data, key, jnp.asarray(geoms))
+    geoms = np.repeat(geoms, len(distance) // len(geoms), axis=0)
+    lies = tuple(map(int, key.types)) == (PLANE, CAPSULE)
+    none = jnp.zeros_like(distance)
+    axis = data.geom_xmat[geoms[:, 1]][:, :, 2] if lies else jnp.zeros_like(place)
+    return Pairs(distance, place, none, none, frame[:, 0], axis, geoms, {})
+
+
+def _from_the_world(scene: Scene, pairs: Pairs) -> Pairs:
+    """Return the same contacts, a geom of the world first in each that has one."""
+    one, other = scene.model.geom_bodyid[pairs.geoms.T]
+    turned = (other == 0) & (one > 0)
+    sign = jnp.where(turned, -1.0, 1.0).astype(pairs.distance.dtype)
+    return replace(
+        pairs,
+        offset=sign * pairs.offset,
+        share=sign * pairs.share,
+        towards=sign[:, None] * pairs.towards,
+        geoms=np.where(turned[:, None], pairs.geoms[:, ::-1], pairs.geoms),
+    )
 
 
 def _together(parts: list[Pairs]) -> Pairs:
     """Return all of them, in this order."""
-    arrays = [jnp.concatenate([getattr(p, name) for p in parts]) for name in ("distance", "place", "normal", "axis")]
+    names = ("distance", "point", "offset", "share", "towards", "axis")
+    arrays = [jnp.concatenate([getattr(p, name) for p in parts]) for name in names]
     surfaces = {name: jnp.concatenate([p.surfaces[name] for p in parts]) for name in FIELDS}
     return Pairs(*arrays, np.concatenate([p.geoms for p in parts]), surfaces)
-
-
-def _touch(key: Any, ids: NDArray[np.int64], model: Any, data: Any) -> tuple[Array, Array, Array]:
-    """Return distances, places and normals of pairs of the same two types, one or more for each pair in turn."""
-    one, other = ids.T
-    types = tuple(map(int, key.types))
-    if types in {(SPHERE, BOX), (SPHERE, CAPSULE)}:
-        nearest = _to_box if types[1] == BOX else _to_capsule
-        centre, radius = data.geom_xpos[one], model.geom_size[one][:, 0]
-        gap, normal = nearest(centre - data.geom_xpos[other], data.geom_xmat[other], model.geom_size[other])
-        distance = gap - radius
-        return distance, centre + normal * (radius + distance / 2)[:, None], normal
-    distance, place, frame = _driver._COLLISION_FUNC[key.types](model, data, key, jnp.asarray(ids))
-    return distance, place, frame[:, 0]
 
 
 def _kept(scene: Scene, pairs: Pairs) -> dict[str, Array]:
@@ -144,15 +158,18 @@ def _kept(scene: Scene, pairs: Pairs) -> dict[str, Array]:
             picked = jnp.where(choosing[:, candidate, None], values[candidate], picked)
         return picked
 
-    numbers = [pairs.distance[:, None], pairs.place, pairs.normal, pairs.axis]
-    numbers += [array.reshape(len(bodies), -1) for array in pairs.surfaces.values()]
+    numbers = [pairs.distance, pairs.point, pairs.offset, pairs.share, pairs.towards, pairs.axis, *pairs.surfaces.values()]
+    numbers = [array.reshape(len(bodies), -1) for array in numbers]
     ends = np.cumsum([array.shape[1] for array in numbers])
-    distance, place, normal, axis, *surfaces = jnp.split(of(jnp.concatenate(numbers, axis=1)), ends[:-1], axis=1)
+    parts = jnp.split(of(jnp.concatenate(numbers, axis=1)), ends[:-1], axis=1)
+    distance, point, offset, share, towards, axis, *surfaces = parts
     made = dict(zip(FIELDS, surfaces, strict=True))
     made["includemargin"] = margin = made["includemargin"][:, 0]
     made["dist"] = jnp.where(jnp.any(chosen, axis=1), distance[:, 0], margin + APART)
+    normal = _of_length_1(towards)
+    made["pos"] = point + (offset + share * distance) * normal
     made["frame"] = _frames(normal, axis, STEEP if scene.robot.is_built_in else TINY)
-    return made | {"pos": place, "geom": of(jnp.asarray(geoms))}
+    return made | {"geom": of(jnp.asarray(geoms))}
 
 
 def _places(
@@ -205,40 +222,52 @@ def _frames(normal: Float[Array, "n 3"], axis: Float[Array, "n 3"], least: float
     y, z = jnp.array([0.0, 1.0, 0.0]), jnp.array([0.0, 0.0, 1.0])
     side, along = across(jnp.where(jnp.abs(normal[:, 1:2]) < 0.5, y, z)), across(axis)
     tangent = jnp.where(jnp.sum(along**2, axis=1, keepdims=True) >= least**2, along, side)
-    tangent = tangent / jnp.sqrt(jnp.sum(tangent**2, axis=1, keepdims=True))
+    tangent = _of_length_1(tangent)
     return jnp.stack([normal, tangent, jnp.cross(normal, tangent)], axis=1)
 
 
+def _of_length_1(vectors: Float[Array, "n 3"]) -> Float[Array, "n 3"]:
+    """Return vectors of the same directions. One quotient for all three numbers: a GPU needs twenty instructions."""
+    return vectors * (1.0 / jnp.sqrt(jnp.sum(vectors**2, axis=1, keepdims=True)))
+
+
+def _to_plane(
+    apart: Float[Array, "n 3"], turn: Float[Array, "n 3 3"], size: Float[Array, "n 3"]
+) -> tuple[Float[Array, " n"], Float[Array, "n 3"]]:
+    """Return how far spheres' centres are from planes, and the direction to them; arguments as for boxes."""
+    up = turn[:, :, 2]
+    return jnp.sum(apart * up, axis=1), -up
+
+
 def _to_capsule(
-    apart: Float[Array, "contacts 3"], turn: Float[Array, "contacts 3 3"], size: Float[Array, "contacts 3"]
-) -> tuple[Float[Array, " contacts"], Float[Array, "contacts 3"]]:
-    """Return how far a sphere's centre is from a capsule, and the direction to its axis; arguments as for a box."""
+    apart: Float[Array, "n 3"], turn: Float[Array, "n 3 3"], size: Float[Array, "n 3"]
+) -> tuple[Float[Array, " n"], Float[Array, "n 3"]]:
+    """Return how far spheres' centres are from capsules, and the direction to their axes; arguments as for boxes."""
     axis = turn[:, :, 2]
     along = jnp.clip(jnp.sum(apart * axis, axis=1), -size[:, 1], size[:, 1])
     to = along[:, None] * axis - apart
     length = jnp.sqrt(jnp.sum(to**2, axis=1))
-    way = jnp.where((length > TINY)[:, None], to / jnp.maximum(length, TINY)[:, None], jnp.array([1.0, 0.0, 0.0])[None])
-    return length - size[:, 0], way
+    return length - size[:, 0], jnp.where((length > TINY)[:, None], to, jnp.array([1.0, 0.0, 0.0]))
 
 
 def _to_box(
-    apart: Float[Array, "contacts 3"], turn: Float[Array, "contacts 3 3"], size: Float[Array, "contacts 3"]
-) -> tuple[Float[Array, " contacts"], Float[Array, "contacts 3"]]:
-    """Return how far a sphere's centre is from a box, less than 0 inside, and the direction from it to the box.
+    apart: Float[Array, "n 3"], turn: Float[Array, "n 3 3"], size: Float[Array, "n 3"]
+) -> tuple[Float[Array, " n"], Float[Array, "n 3"]]:
+    """Return how far spheres' centres are from boxes, less than 0 inside, and the direction to them, of any length.
 
     Args:
-        apart: from the box's centre to the sphere's.
-        turn: the box's axes as columns.
+        apart: from the boxes' centres to the spheres'.
+        turn: the boxes' axes as columns.
         size: half-sizes.
     """
     local = jnp.sum(turn * apart[:, :, None], axis=1)
     to = jnp.clip(local, -size, size) - local
     outside = jnp.sqrt(jnp.sum(to**2, axis=1))
+    # Inside, a sphere is pushed out of the nearest side; the first of equals, as in C: -x, +x, -y, …
+    x, y, z = (size - jnp.abs(local)).T
+    leaves = jnp.stack([(x <= y) & (x <= z), (x > y) & (y <= z), (z < x) & (z < y)], axis=1)
+    back = jnp.where(leaves, jnp.where(local <= 0.0, 1.0, -1.0), 0.0)
     within = outside <= TINY
-    # Inside, it is pushed out of the nearest side; the first of equals, as in C: -x, +x, -y, …
-    depths = jnp.stack([local + size, size - local], axis=2).reshape(-1, 6)
-    depth = jnp.min(depths, axis=1)
-    nearest = jnp.argmin(depths, axis=1)
-    out = jnp.stack([(nearest == 2 * axis) * 1.0 - (nearest == 2 * axis + 1) * 1.0 for axis in range(3)], axis=1)
-    way = jnp.where(within[:, None], out, to / jnp.maximum(outside, TINY)[:, None])
-    return jnp.where(within, -depth, outside), jnp.sum(turn * way[:, None, :], axis=2)
+    towards = jnp.where(within[:, None], back, to)
+    depth = jnp.minimum(jnp.minimum(x, y), z)
+    return jnp.where(within, -depth, outside), jnp.sum(turn * towards[:, None, :], axis=2)

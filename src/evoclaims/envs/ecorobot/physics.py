@@ -67,8 +67,12 @@ def _frame(scene: Scene, body: Body, control: Float[Array, " nu"], places: Place
         model = on_device(scene.mjx)
         if places:
             geoms = box_geoms(scene.model)
-            nearest = _nearest(scene, model, body, places)
-            theirs = {name: jnp.asarray(array)[nearest] for name, array in places.items()}
+            theirs = {name: jnp.asarray(array) for name, array in places.items()}
+            if scene.near < len(scene.boxes):
+                nearest = _nearest(scene, model, body, places)
+                theirs = {name: array[nearest] for name, array in theirs.items()}
+            if "geom_quat" in theirs:  # boxes turn only about the vertical, which saves many operations if known
+                theirs["geom_quat"] *= jnp.array([1.0, 0.0, 0.0, 1.0])
             model = model.replace(**{name: getattr(model, name).at[geoms].set(new) for name, new in theirs.items()})
         data = on_device(scene.blank).replace(ctrl=control)
         if scene.integrates_by_rk4:

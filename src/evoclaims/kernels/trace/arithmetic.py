@@ -105,6 +105,11 @@ def _dot_general(s: Scalars, equation: Any, left: Numbers, right: Numbers) -> Se
     return [listed(products, aval.shape)]
 
 
+def _quotient(s: Scalars, a: ex.Number, b: ex.Number) -> ex.Number:
+    """Return a / b, by the reciprocal of b: a factor divides many numbers by each on its diagonal."""
+    return s.algebra.apply("mul", a, s.algebra.apply("div", b.dtype.type(1), b))
+
+
 @primitive("cholesky")
 def _cholesky(s: Scalars, equation: Any, x: Numbers) -> Sequence[Numbers]:
     lower = filled(x.shape, equation.outvars[0].aval.dtype.type(0))
@@ -115,7 +120,7 @@ def _cholesky(s: Scalars, equation: Any, x: Numbers) -> Sequence[Numbers]:
                 rest = s.fold("sub", [x[at][row, column], *products])
                 root = row == column
                 lower[at][row, column] = (
-                    s.algebra.apply("sqrt", rest) if root else s.algebra.apply("div", rest, lower[at][column, column])
+                    s.algebra.apply("sqrt", rest) if root else _quotient(s, rest, lower[at][column, column])
                 )
     return [lower]
 
@@ -135,7 +140,7 @@ def _triangular_solve(s: Scalars, equation: Any, matrix: Numbers, right: Numbers
             for j in size[:i] if forward else size[i + 1 :]:
                 product = s.elementwise("mul", rows[at][i, j : j + 1], solution[at][j])
                 solution[at][i] = s.elementwise("sub", solution[at][i], product)
-            solution[at][i] = s.elementwise("div", solution[at][i], rows[at][i, i : i + 1])
+            solution[at][i] = s.each(lambda a, b: _quotient(s, a, b), solution[at][i], rows[at][i, i : i + 1])
     return [solution]
 
 
