@@ -50,6 +50,7 @@ class Pairs:
         towards: from the first geom to the second, of any length.
         axis: along which the friction pyramid lies; 0 where only the normal decides.
         geoms: MuJoCo's ids, known while tracing.
+        kinds: what touches what: equal numbers for the same two types of geoms.
         surfaces: each array of `FIELDS`.
     """
 
@@ -60,6 +61,7 @@ class Pairs:
     towards: Array
     axis: Array
     geoms: NDArray[np.int64]
+    kinds: NDArray[np.int64]
     surfaces: dict[str, Array]
 
 
@@ -90,7 +92,9 @@ def _found(scene: Scene, model: Any, data: Any) -> dict[int, Pairs]:
     parts: dict[int, list[Pairs]] = {}
     known = _driver._geom_groups(scene.model)
     for (key, geoms), shared in zip(known.items(), _driver._contact_groups(model, data).values(), strict=True):
-        pairs = _of_spheres(key, np.array(geoms)[:, :2], model, data) or _by_mjx(key, np.array(geoms)[:, :2], model, data)
+        pairs = _of_spheres(key, np.array(geoms)[:, :2], model, data) or _by_mjx(
+            key, np.array(geoms)[:, :2], model, data
+        )
         each = len(pairs.geoms) // len(geoms)
         surfaces = {name: jnp.repeat(getattr(shared, name), each, axis=0) for name in FIELDS}
         parts.setdefault(key.condim, []).append(_from_the_world(scene, replace(pairs, surfaces=surfaces)))
@@ -108,7 +112,7 @@ def _of_spheres(key: Any, geoms: NDArray[np.int64], model: Any, data: Any) -> Pa
     centre, radius = data.geom_xpos[sphere], model.geom_size[sphere][:, 0]
     gap, towards = nearest(centre - data.geom_xpos[other], data.geom_xmat[other], model.geom_size[other])
     half, none = jnp.full_like(radius, 0.5), jnp.zeros_like(centre)
-    return Pairs(gap - radius, centre, radius, half, towards, none, geoms, {})
+    return Pairs(gap - radius, centre, radius, half, towards, none, geoms, np.zeros(len(geoms), np.int64), {})
 
 
 def _by_mjx(key: Any, geoms: NDArray[np.int64], model: Any, data: Any) -> Pairs:
@@ -118,7 +122,7 @@ def _by_mjx(key: Any, geoms: NDArray[np.int64], model: Any, data: Any) -> Pairs:
     lies = tuple(map(int, key.types)) == (PLANE, CAPSULE)
     none = jnp.zeros_like(distance)
     axis = data.geom_xmat[geoms[:, 1]][:, :, 2] if lies else jnp.zeros_like(place)
-    return Pairs(distance, place, none, none, frame[:, 0], axis, geoms, {})
+    return Pairs(distance, place, none, none, frame[:, 0], axis, geoms, np.zeros(len(geoms), np.int64), {})
 
 
 def _from_the_world(scene: Scene, pairs: Pairs) -> Pairs:
@@ -140,7 +144,8 @@ def _together(parts: list[Pairs]) -> Pairs:
     names = ("distance", "point", "offset", "share", "towards", "axis")
     arrays = [jnp.concatenate([getattr(p, name) for p in parts]) for name in names]
     surfaces = {name: jnp.concatenate([p.surfaces[name] for p in parts]) for name in FIELDS}
-    return Pairs(*arrays, np.concatenate([p.geoms for p in parts]), surfaces)
+    kinds = np.repeat(np.arange(len(parts)), [len(p.geoms) for p in parts])
+    return Pairs(*arrays, np.concatenate([p.geoms for p in parts]), kinds, surfaces)
 
 
 def _kept(scene: Scene, pairs: Pairs) -> dict[str, Array]:
@@ -149,7 +154,7 @@ def _kept(scene: Scene, pairs: Pairs) -> dict[str, Array]:
     # A contact's geoms are asked for their bodies alone, so the first geom of a body stands for all.
     geoms = scene.model.body_geomadr[bodies]
     touching = pairs.distance < pairs.surfaces["includemargin"]
-    chosen, last = _places(scene.robot, bodies, pairs.distance, touching)
+    chosen, last = _places(scene.robot, bodies, pairs.kinds, pairs.distance, touching)
     choosing = chosen & (last[:, None] != np.arange(len(bodies)))
 
     def of(values: Array) -> Array:
@@ -158,7 +163,15 @@ def _kept(scene: Scene, pairs: Pairs) -> dict[str, Array]:
             picked = jnp.where(choosing[:, candidate, None], values[candidate], picked)
         return picked
 
-    numbers = [pairs.distance, pairs.point, pairs.offset, pairs.share, pairs.towards, pairs.axis, *pairs.surfaces.values()]
+    numbers = [
+        pairs.distance,
+        pairs.point,
+        pairs.offset,
+        pairs.share,
+        pairs.towards,
+        pairs.axis,
+        *pairs.surfaces.values(),
+    ]
     numbers = [array.reshape(len(bodies), -1) for array in numbers]
     ends = np.cumsum([array.shape[1] for array in numbers])
     parts = jnp.split(of(jnp.concatenate(numbers, axis=1)), ends[:-1], axis=1)
@@ -173,7 +186,11 @@ def _kept(scene: Scene, pairs: Pairs) -> dict[str, Array]:
 
 
 def _places(
-    robot: Robot, bodies: NDArray[np.int64], distance: Float[Array, " n"], touching: Bool[Array, " n"]
+    robot: Robot,
+    bodies: NDArray[np.int64],
+    kinds: NDArray[np.int64],
+    distance: Float[Array, " n"],
+    touching: Bool[Array, " n"],
 ) -> tuple[Bool[Array, "places n"], NDArray[np.int64]]:
     """Return which contact is at which place, at most one at each; and the last that can be there.
 
@@ -186,14 +203,14 @@ def _places(
         return np.eye(n, dtype=bool) & touching, np.arange(n)
     deep = distance <= -jax.lax.top_k(-distance, most)[0][-1]
     kept = touching & (deep | ~unusual(jnp.sum(touching) > most))
-    limbs = np.unique(bodies[:, 1])
     earlier = np.tri(n, k=-1, dtype=bool)
-    if np.any(bodies[:, 0]) or len(limbs) > most // 2:
+    _, limbs = np.unique(np.stack([bodies[:, 1], kinds]), axis=1, return_inverse=True)
+    if np.any(bodies[:, 0]) or max(limbs) >= most:
         at = jnp.sum(kept & earlier, axis=1) == np.arange(most)[:, None]
         allowed = jnp.concatenate([jnp.full(usual, True), jnp.full(most - usual, unusual(jnp.sum(kept) > usual))])
         return kept & at & allowed[:, None], np.full(most, n - 1)
-    theirs = bodies[:, 1] == limbs[:, None]
-    second = kept & jnp.any(kept & earlier & (bodies[:, 1] == bodies[:, 1:]), axis=1)
+    theirs = limbs == np.arange(max(limbs) + 1)[:, None]
+    second = kept & jnp.any(kept & earlier & (limbs == limbs[:, None]), axis=1)
     second &= unusual(jnp.any(second))
     at = jnp.sum(second & earlier, axis=1) == np.arange(_seconds(theirs.sum(axis=1), most))[:, None]
     last = [*(int(np.flatnonzero(own)[-1]) for own in theirs), *[n - 1] * len(at)]
