@@ -72,7 +72,7 @@ def capsule_on_box(
     meets = (highest < 0) & (first <= last)
     ends, rise = jnp.clip(jnp.stack([first, last]), -half_length, half_length), out @ axis
     face_gap = highest + half_length * jnp.abs(rise) + rise * ends
-    face_place = centre + ends[:, None] * axis - (face_gap / 2 + radius)[:, None] * out
+    face_place = centre[None] + jnp.outer(ends, axis) - jnp.outer(face_gap / 2 + radius, out)
 
     # The edge, if the capsule is beyond two faces where it is nearest to the box.
     along = _nearest(centre, axis, enter, leave, far + span > box_size)
@@ -92,7 +92,7 @@ def capsule_on_box(
     edge_place = point + (length + radius) / 2 * way
     place = jnp.stack([jnp.where(edge, edge_place, face_place[0]), face_place[1]])
     normal = jnp.stack([jnp.where(edge, way, -out), -out])
-    return distance, box_place + place @ box_turn.T, normal @ box_turn.T
+    return distance, box_place[None] + place @ box_turn.T, normal @ box_turn.T
 
 
 def _nearest(
