@@ -97,11 +97,17 @@ def test_what_has_no_bound_may_touch_all(more: str) -> None:
     assert touched_at_once(model, stones.WALLS) == len(stones.WALLS)
 
 
-def test_boxes_do_not_take_turns_where_all_can_be_touched_or_there_are_none() -> None:
+@pytest.mark.parametrize("robot", [SIMPLE_ROB, ANT])
+def test_all_boxes_are_simulated_where_all_can_be_touched(robot: Robot) -> None:
     corner = (Box((0.0, 0.0), (1.0, 0.1)), Box((0.0, 0.0), (1.0, 0.1), angle=90.0))
-    assert Scene(SIMPLE_ROB, corner).turns == {}
-    assert Scene(SIMPLE_ROB, corner).model.ngeom == Scene(SIMPLE_ROB, corner).whole.ngeom
-    assert Scene(SIMPLE_ROB).turns == {}
+    assert Scene(robot, corner).near == 2
+    assert Scene(robot, corner).model.ngeom == Scene(robot, corner).whole.ngeom
+    assert Scene(robot).turns == {}
+
+
+def test_all_boxes_are_simulated_for_a_single_sphere() -> None:
+    far = tuple(Box((4.0 * i, 0.0), (0.1, 0.1)) for i in range(3))
+    assert (Scene(SIMPLE_ROB, far).near, Scene(ANT, far).near) == (3, 1)
 
 
 def test_boxes_that_are_alike_differ_in_their_place_alone() -> None:
@@ -113,7 +119,7 @@ def test_boxes_that_are_alike_differ_in_their_place_alone() -> None:
 
 def test_the_boxes_that_are_simulated_are_those_nearest_to_the_torso() -> None:
     """Among the walls of the stones' maze, five of which are turned; distances by `Box`."""
-    task = stones.SteppingStones()
+    task = stones.SteppingStones(robot=ANT)
     scene, random = task.scene, np.random.default_rng(1)
     places = np.concatenate([random.uniform(low, high, (400, 1)) for low, high in task.area], axis=1)
     starts = np.tile(scene.start, (400, 1))

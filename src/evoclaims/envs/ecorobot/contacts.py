@@ -19,6 +19,7 @@ from jaxtyping import Array, Bool, Float
 from numpy.typing import NDArray
 
 from evoclaims.core.foreign import Later
+from evoclaims.envs.ecorobot.capsule_box import capsule_on_box
 from evoclaims.envs.ecorobot.robots import Robot
 from evoclaims.envs.ecorobot.scene import Scene
 from evoclaims.kernels import seldom
@@ -116,13 +117,21 @@ def _of_spheres(key: Any, geoms: NDArray[np.int64], model: Any, data: Any) -> Pa
 
 
 def _by_mjx(key: Any, geoms: NDArray[np.int64], model: Any, data: Any) -> Pairs:
-    """Return the contacts that MJX computes, one or more for each pair in turn."""
-    distance, place, frame = _driver._COLLISION_FUNC[key.types](model, data, key, jnp.asarray(geoms))
+    """Return the contacts as MJX computes them, one or more for each pair in turn."""
+    types = tuple(map(int, key.types))
+    if types == (CAPSULE, BOX):
+        capsule, box = geoms.T
+        length_and_radius = model.geom_size[capsule][:, 1], model.geom_size[capsule][:, 0]
+        bodies = data.geom_xpos[capsule], data.geom_xmat[capsule][:, :, 2], *length_and_radius
+        boxes = data.geom_xpos[box], data.geom_xmat[box], model.geom_size[box]
+        distance, place, normal = map(jnp.concatenate, jax.vmap(capsule_on_box)(*bodies, *boxes))
+    else:
+        distance, place, frame = _driver._COLLISION_FUNC[key.types](model, data, key, jnp.asarray(geoms))
+        normal = frame[:, 0]
     geoms = np.repeat(geoms, len(distance) // len(geoms), axis=0)
-    lies = tuple(map(int, key.types)) == (PLANE, CAPSULE)
-    none = jnp.zeros_like(distance)
-    axis = data.geom_xmat[geoms[:, 1]][:, :, 2] if lies else jnp.zeros_like(place)
-    return Pairs(distance, place, none, none, frame[:, 0], axis, geoms, np.zeros(len(geoms), np.int64), {})
+    lies = types == (PLANE, CAPSULE)
+    none, axis = jnp.zeros_like(distance), data.geom_xmat[geoms[:, 1]][:, :, 2] if lies else jnp.zeros_like(place)
+    return Pairs(distance, place, none, none, normal, axis, geoms, np.zeros(len(geoms), np.int64), {})
 
 
 def _from_the_world(scene: Scene, pairs: Pairs) -> Pairs:
