@@ -144,19 +144,16 @@ def _sorted(s: Scalars, before: str, keys: Numbers, columns: Sequence[Numbers], 
     size = keys.shape[-1]
     results = [np.empty((*keys.shape[:-1], count), object) for _ in columns]
     for at in np.ndindex(*keys.shape[:-1]):
-        rank: list[Number] = [np.int32(size - 1 - place) for place in range(size)]  # as if later ones came before
-        for later in range(size):
-            for earlier in range(later):
-                keep = s.algebra.cast(s.algebra.apply(before, keys[at][earlier], keys[at][later]), np.int32)
-                rank[later] = s.algebra.apply("add", rank[later], keep)
-                rank[earlier] = s.algebra.apply("sub", rank[earlier], keep)
-        for result, column in zip(results, columns, strict=True):
-            for place in range(count):
-                value = column[at][size - 1]
-                for i in reversed(range(size - 1)):
-                    here = s.algebra.apply("eq", rank[i], np.int32(place))
-                    value = s.algebra.apply("select", here, column[at][i], value)
-                result[at][place] = value
+        rows = [list(array[at]) for array in (keys, *columns)]
+        for place in range(count):
+            for i in reversed(range(place, size - 1)):  # the next in order moves to the front
+                keep = s.algebra.apply(before, rows[0][i], rows[0][i + 1])
+                for row in rows:
+                    one, other = row[i], row[i + 1]
+                    row[i] = s.algebra.apply("select", keep, one, other)
+                    row[i + 1] = s.algebra.apply("select", keep, other, one)
+        for result, row in zip(results, rows[1:], strict=True):
+            result[at][:] = row[:count]
     return results
 
 
