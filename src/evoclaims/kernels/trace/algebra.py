@@ -186,12 +186,20 @@ def _shift(algebra: Algebra, a: Number, places: Number) -> Number | None:
 def _select(algebra: Algebra, condition: Number, yes: Number, no: Number) -> Number | None:
     if is_known(condition):
         return yes if condition else no
-    if yes is no or (is_known(yes) and is_known(no) and yes.tobytes() == no.tobytes()):
+    if _same_number(yes, no):
         return yes
     if yes.dtype == bool:  # GPUs have no instruction that selects between conditions
         other = algebra.apply("and", algebra.apply("not", condition), no)
         return algebra.apply("or", algebra.apply("and", condition, yes), other)
+    if isinstance(no, ScalarOperation) and no.name == "select" and _same_number(yes, no.operands[1]):
+        # Where many numbers are chosen by the same conditions, so are the conditions of equal ones.
+        return algebra.apply("select", algebra.apply("or", condition, no.operands[0]), *no.operands[1:])
     return None
+
+
+def _same_number(a: Number, b: Number) -> bool:
+    """Whether two numbers are the same expression, or known to have the same bits."""
+    return a is b or (is_known(a) and is_known(b) and a.tobytes() == b.tobytes())
 
 
 RULES: Final[dict[str, Rule]] = {
