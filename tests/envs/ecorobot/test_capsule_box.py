@@ -24,6 +24,8 @@ MANY = 20_000
 TOLERANCE = 1e-4
 # How many may be off by more: a rounding error decides whether MJX takes the face, or which one.
 SELDOM = 1 / 2_000
+MARGIN = 0.02
+"""Contacts with a smaller distance are compared, m: those that touch, and those that a margin would let act."""
 ALONG = 0.04
 """How far the place on an edge that is parallel to the axis may be off along it, m: MJX divides rounding by 1e-6."""
 # How many of three coordinates of the capsule's nearest point are beyond the box.
@@ -89,7 +91,7 @@ def _poses(
 
 
 def _off(poses: Poses, one: Contacts, other: Contacts) -> Numbers:
-    """Return by how much contacts differ that touch in one or the other; a normal, by where it ends.
+    """Return by how much contacts differ that are near in one or the other; a normal, by where it ends.
 
     MJX shortens an edge or the axis by 5e-7 / its half length where it looks for the nearest points. This is not
     counted, nor how it turns a normal and moves the place between both surfaces.
@@ -100,18 +102,21 @@ def _off(poses: Poses, one: Contacts, other: Contacts) -> Numbers:
     ends = np.abs(normal - normal2).max(axis=2) * apart - shortened
     places = np.abs(place - place2).max(axis=2) - shortened * (1 + poses[3][:, None] / apart)
     differences = np.maximum(np.abs(gap - gap2), np.maximum(ends, places))
-    return np.where((gap < 0) | (gap2 < 0), differences, 0).max(axis=1)
+    return np.where((gap < MARGIN) | (gap2 < MARGIN), differences, 0).max(axis=1)
 
 
 def _check_where_mjx_jumps(random: np.random.Generator, poses: Poses, ours: Contacts) -> None:
-    """Check that MJX gives our contacts, too, for poses that differ by no more than about 1e-5."""
+    """Check that MJX gives our contacts, too, for poses that differ by no more than about 1e-5.
+
+    One may be left: shortening (`_off`) turns a normal further than this, to the other side of MJX's cosine of 0.99.
+    """
     times = 64
     moved = [np.repeat(p, times, axis=0) for p in poses]
     size = np.resize([1e-5, 1e-6], len(moved[0]))[:, None]
     moved[0] = np.float32(moved[0] + random.normal(size=moved[0].shape) * size)
     moved[1] = np.float32(_unit(moved[1] + random.normal(size=moved[1].shape) * size))
     mjx, same = map(np.asarray, _all_mjx(*moved)), (np.repeat(c, times, axis=0) for c in ours)
-    assert (_off(tuple(moved), tuple(mjx), tuple(same)).reshape(-1, times).min(axis=1) < TOLERANCE).all()
+    assert (_off(tuple(moved), tuple(mjx), tuple(same)).reshape(-1, times).min(axis=1) >= TOLERANCE).sum() <= 1
 
 
 def _touches_edge(contacts: Contacts) -> Any:
@@ -137,9 +142,8 @@ def _compare(random: np.random.Generator, poses: Poses, some_on: tuple[str, ...]
 @pytest.mark.parametrize("near", NEAR)
 def test_contacts_are_mjx_s(near: str, box: str) -> None:
     random = np.random.default_rng(0)
-    _compare(
-        random, _poses(random, near, box, turn=_turns(random)), ("face",) if near == "inside" else ("face", "edge")
-    )
+    poses = _poses(random, near, box, turn=_turns(random))
+    _compare(random, poses, ("face",) if near == "inside" else ("face", "edge"))
 
 
 @pytest.mark.parametrize("near", ["face", "edge"])
@@ -190,6 +194,13 @@ def test_of_capsules_parallel_to_an_edge() -> None:
     assert np.abs(apart).max() < ALONG
     nearest = middle + np.clip(-middle, -poses[2], poses[2])
     np.testing.assert_allclose((ours[1][:, 0] - poses[4])[rows, along][alone], nearest[alone], atol=1e-5)
+
+
+def test_in_the_middle_of_a_box_the_first_of_equal_faces_counts() -> None:
+    random = np.random.default_rng(7)
+    poses = list(_poses(random, "inside"))
+    poses[0] = poses[4]
+    _compare(random, tuple(poses), ("face",))
 
 
 def test_of_spheres() -> None:

@@ -1,15 +1,19 @@
-"""A capsule's contacts with a box, equal to MJX's up to rounding, in a seventh of its operations.
+"""A capsule's contacts with a box: MJX's up to rounding, with about a seventh of its operations.
 
 MJX has one function for capsules and all convex bodies. It clips the capsule's axis to the face that it is least deep
-in: two contacts, one at each end. Instead of the first it takes the nearest of the edges, where the capsule is beyond
-both of its faces and less deep, and then there is no second.
+in, which makes two contacts, one at each end. Instead of both it takes one on the nearest edge, if the capsule is
+beyond both faces there, and less deep.
 
-Seen from a box all is simpler. Point t of the axis, centre + t · axis, is between the two faces across x for t in an
-interval, and so for y and z. Clipping keeps what is in two of the intervals. The nearest edge needs no search among
-twelve: where the capsule is beyond two faces or three, the box's nearest point is on an edge; no edge is nearer than
-the box; and the distance to the box has one minimum along the axis. So MJX has an edge's contact only at this minimum,
-and there whenever it is beyond two faces. Its place is a formula: the squared distance is Σₖ axisₖ² · (how far t is
-from the k-th interval)².
+Seen from the box all is simpler. The point centre + t · axis is between the two faces across x for t in an interval,
+and so for y and z. Clipping keeps what is in two of the intervals. The nearest edge needs no search among twelve:
+where a point is beyond two faces or three, an edge is the nearest of the whole box; no edge is nearer than the box;
+and along the axis, the distance to the box has no minimum but the smallest. So there, and nowhere else, MJX can find
+an edge that the capsule is beyond. The squared distance is Σₖ axisₖ² · (how far t is from the k-th interval)², which
+gives the place of the minimum.
+
+Two things differ. MJX finds points up to 5e-7 / half length short of the nearest. And where a capsule is parallel to
+an edge and reaches beyond its end, three edges are as near: MJX takes one by rounding, and misses the contact if the
+capsule is not beyond it.
 """
 
 from __future__ import annotations
@@ -70,7 +74,8 @@ def capsule_on_box(
     first = jnp.maximum(-half_length, jnp.max(jnp.where(sides, enter[1], enter[other])))
     last = jnp.minimum(half_length, jnp.min(jnp.where(sides, leave[1], leave[other])))
     meets = (highest < 0) & (first <= last)
-    ends, rise = jnp.clip(jnp.stack([first, last]), -half_length, half_length), out @ axis
+    ends = jnp.stack([jnp.minimum(first, half_length), jnp.maximum(last, -half_length)])
+    rise = out @ axis
     face_gap = highest + half_length * jnp.abs(rise) + rise * ends
     face_place = centre[None] + jnp.outer(ends, axis) - jnp.outer(face_gap / 2 + radius, out)
 
