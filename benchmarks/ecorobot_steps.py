@@ -104,6 +104,44 @@ def c_mujoco(task: RobotTask, steps: int) -> float:
     return cores * steps / (time.perf_counter() - began)
 
 
+def mujoco_warp(task: RobotTask, environments: int, steps: int) -> Callable[[], Any]:
+    """Return the same for MuJoCo Warp on a GPU, on the model with every box: an environment step is a CUDA graph."""
+    import mujoco_warp as mjw
+    import warp
+
+    warp.config.quiet = True
+    model, data = task.scene.whole, mujoco.MjData(task.scene.whole)
+    keys = jax.random.split(jax.random.key(0), environments)
+    start = np.array(jax.vmap(task.reset, in_axes=(0, None))(keys, jnp.zeros((), jnp.int32)).inner.body.position)
+    mujoco.mj_forward(model, data)
+    # Room for twice the contacts that ours keeps, of four rows each, and for every joint's limit.
+    contacts = 2 * task.robot.contacts
+    theirs, worlds = (
+        mjw.put_model(model),
+        mjw.put_data(model, data, nworld=environments, nconmax=contacts, njmax=4 * contacts + model.njnt),
+    )
+    warp.copy(worlds.qpos, warp.array(start, dtype=float))
+    random = np.random.default_rng(0)
+    actions = [warp.array(random.uniform(-1, 1, (environments, model.nu)), dtype=float) for _ in range(-(-steps // 10))]
+    mjw.step(theirs, worlds)  # compiles
+    with warp.ScopedCapture() as capture:
+        for _ in range(task.robot.frames):
+            mjw.step(theirs, worlds)
+
+    def again() -> float:
+        warp.synchronize()
+        began = time.perf_counter()
+        for index in range(steps):
+            if index % 10 == 0:
+                warp.copy(worlds.ctrl, actions[index // 10])
+            warp.capture_launch(capture.graph)
+        warp.synchronize()
+        return time.perf_counter() - began
+
+    again()
+    return again
+
+
 def report_difference(task: RobotTask) -> None:
     """Print how far the kernel's observations are from those of XLA's kernels, each a step from the same state."""
     step, plain_step = (jax.jit(jax.vmap(f)) for f in (task.step, task.plain_step))
@@ -156,6 +194,7 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=50)
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--no-plain", action="store_true")
+    parser.add_argument("--warp", action="store_true", help="compare with MuJoCo Warp, where it is installed, too")
     options = parser.parse_args()
     configure()
     warnings.simplefilter("ignore")
@@ -167,11 +206,13 @@ def main() -> None:
             for environments in options.environments:
                 print(f"{name}, {environments} environments", flush=True)
                 runs = {"ours": ours(task, task.step, environments, options.steps)}
-                if not on_cpu:
+                if not on_cpu and not options.no_plain:
                     report_difference(task)
                     runs["ours, in XLA's kernels"] = ours(task, task.plain_step, environments, options.steps)
                 if not options.no_plain:
                     runs["plain mjx.step"] = plain(task, environments, options.steps)
+                if options.warp:
+                    runs["MuJoCo Warp"] = mujoco_warp(task, environments, options.steps)
                 rates: dict[str, list[float]] = {}
                 for _ in range(options.rounds):
                     for kind, run in runs.items():
