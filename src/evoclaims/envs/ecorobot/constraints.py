@@ -15,7 +15,7 @@ from jaxtyping import Array, Float
 
 SMALL: Final = 3
 """Systems up to this size are solved by formulas without loops, which a compiler fuses with the code around them."""
-PIECES: Final = 6
+PIECES: Final = 5
 """How many straight lines a line search tries. In one of a million frames the last is not yet the right one; then the
 minimum is missed by little, as it is by MJX's four tries. Looking at all bends needs the square of the rows."""
 

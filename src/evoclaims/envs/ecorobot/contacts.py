@@ -293,7 +293,7 @@ def _to_box(
     x, y, z = (size - jnp.abs(local)).T
     leaves = jnp.stack([(x <= y) & (x <= z), (x > y) & (y <= z), (z < x) & (z < y)], axis=1)
     back = jnp.where(leaves, jnp.where(local <= 0.0, 1.0, -1.0), 0.0)
-    within = outside <= TINY
+    within = seldom(outside <= TINY)
     towards = jnp.where(within[:, None], back, to)
     depth = jnp.minimum(jnp.minimum(x, y), z)
     return jnp.where(within, -depth, outside), jnp.sum(turn * towards[:, None, :], axis=2)

@@ -221,6 +221,10 @@ def _compiled(robot: Robot, boxes: tuple[Box, ...]) -> mujoco.MjModel:
         option = spec.option
         option.solver, option.iterations, option.ls_iterations = mujoco.mjtSolver.mjSOL_NEWTON, 1, 4
         option.disableflags |= mujoco.mjtDisableBit.mjDSBL_EULERDAMP
+        # Bodies without joints are made parts of their parents, which saves a twentieth of an ant's step. What touches
+        # stays apart: how hard a contact is depends on the body.
+        welded = [body for body in spec.bodies if body.parent is not None and not body.joints]
+        spec.compiler.fusestatic = not any(geom.contype or geom.conaffinity for body in welded for geom in body.geoms)
     # Remove Brax's own numbers: MJX (3.17) looks up its setting by the index of its name, not of its data, and would
     # read one of Brax's (the ant lost all contacts).
     for numeric in list(spec.numerics):
