@@ -7,6 +7,7 @@ hundred operations; the slope along a line is piecewise linear, so its root can 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Final
 
 import jax
@@ -49,14 +50,26 @@ def cholesky_solve(matrix: Float[Array, "n n"], right: Float[Array, " n"]) -> Fl
     return jnp.stack(backward)
 
 
+@dataclass(frozen=True)
+class Rows:
+    """Constraints that only push.
+
+    Attributes:
+        mix: of directions, with numbers known while tracing; a friction pyramid's edges are the normal and a tangent, so
+            four of them share three directions.
+        directions: in the space of velocities; mix · directions is J.
+        reference: r, per s².
+        stiffness: D; 0 where nothing can push.
+    """
+
+    mix: Float[Array, "rows directions"]
+    directions: Float[Array, "directions nv"]
+    reference: Float[Array, " rows"]
+    stiffness: Float[Array, " rows"]
+
+
 def constrained_acceleration(
-    mass: Float[Array, "nv nv"],
-    force: Float[Array, " nv"],
-    warm: Float[Array, " nv"],
-    jacobian: Float[Array, "rows nv"],
-    reference: Float[Array, " rows"],
-    stiffness: Float[Array, " rows"],
-    steps: int = 1,
+    mass: Float[Array, "nv nv"], force: Float[Array, " nv"], warm: Float[Array, " nv"], rows: Rows, steps: int = 1
 ) -> Float[Array, " nv"]:
     """Return the acceleration after some Newton steps.
 
@@ -64,18 +77,21 @@ def constrained_acceleration(
         mass: M.
         force: all smooth forces, M a₀.
         warm: the last step's acceleration; the starting point, if it costs less than a₀.
-        jacobian: J, of constraints that only push.
-        reference: r.
-        stiffness: D.
+        rows: the constraints.
         steps: how many. One is what the paper's robots take; the minimum needs a few, since after a step as many
             constraints push as before it in most cases, and then the next step is exact.
     """
     free = cholesky_solve(mass, force)
-    if not jacobian.shape[0]:
+    mix, directions, stiffness = rows.mix, rows.directions, rows.stiffness
+    if not stiffness.shape[0]:
         return free
 
+    def moved(a: Array) -> Array:
+        along: Array = mix @ (directions @ a)
+        return along
+
     def start_at(a: Array) -> tuple[Array, Array, Array]:
-        off = jacobian @ a - reference
+        off = moved(a) - rows.reference
         shift = mass @ (a - free)
         return 0.5 * shift @ (a - free) + 0.5 * jnp.sum(stiffness * jnp.minimum(off, 0.0) ** 2), off, shift
 
@@ -88,14 +104,13 @@ def constrained_acceleration(
 
     def newton(a: Array, off: Array, shift: Array) -> Array:
         active = jnp.where(off < 0, stiffness, 0.0)
-        gradient = shift + (active * off) @ jacobian
-        hessian = mass + jnp.einsum("ri,r,rj->ij", jacobian, active, jacobian)
+        gradient = shift + ((active * off) @ mix) @ directions
+        hessian = mass + directions.T @ (jnp.einsum("rd,r,re->de", mix, active, mix) @ directions)
         search = -cholesky_solve(hessian, gradient)
-        along = jacobian @ search
-        return a + _root(search @ shift, search @ (mass @ search), stiffness, off, along) * search
+        return a + _root(search @ shift, search @ (mass @ search), stiffness, off, moved(search)) * search
 
     def again(a: Array, _: None) -> tuple[Array, None]:
-        return newton(a, jacobian @ a - reference, mass @ (a - free)), None
+        return newton(a, moved(a) - rows.reference, mass @ (a - free)), None
 
     first = newton(a, off, shift)
     return first if steps == 1 else jax.lax.scan(again, first, None, length=steps - 1)[0]

@@ -15,19 +15,20 @@ import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, Int
 from numpy.typing import NDArray
 
 from evoclaims.core.foreign import Later
 from evoclaims.envs.ecorobot.capsule_box import capsule_on_box
+from evoclaims.envs.ecorobot.constraints import Rows
 from evoclaims.envs.ecorobot.robots import Robot
-from evoclaims.envs.ecorobot.scene import Scene
+from evoclaims.envs.ecorobot.scene import Scene, mjx
 from evoclaims.kernels import seldom
 
 _driver = Later("mujoco.mjx._src.collision_driver")
+_constraint = Later("mujoco.mjx._src.constraint")
+_support = Later("mujoco.mjx._src.support")
 
-APART: Final = 1.0
-"""Distance of contacts that do not touch, m."""
 TINY: Final = 1e-15
 """MuJoCo's smallest length (mjMINVAL)."""
 STEEP: Final = 0.5
@@ -35,7 +36,7 @@ STEEP: Final = 0.5
 PLANE, SPHERE, CAPSULE, BOX = (
     int(getattr(mujoco.mjtGeom, f"mjGEOM_{k}")) for k in ("PLANE", "SPHERE", "CAPSULE", "BOX")
 )
-FIELDS: Final = ("includemargin", "friction", "solref", "solreffriction", "solimp")
+FIELDS: Final = ("includemargin", "friction", "solref", "solimp")
 """What MJX's contacts have of surfaces and their solver."""
 
 
@@ -66,26 +67,82 @@ class Pairs:
     surfaces: dict[str, Array]
 
 
-def with_contacts(scene: Scene, model: Any, data: Any) -> Any:
-    """Return MJX's data with the contacts that are kept: the deepest of those that touch, if these are too many.
+@dataclass(frozen=True)
+class Kept:
+    """Contacts that are kept, as arrays [places, …].
 
-    Places that no contact needs have a distance of `APART` and the numbers of any contact.
+    Attributes:
+        touches: whether there is one at this place; if not, the other numbers are those of any contact.
+        distance: less than 0, m.
+        place: between the surfaces, in the middle.
+        frame: the normal and two tangents, as rows.
+        bodies: MuJoCo's ids; the world or the first of two robots' comes first.
+        surfaces: each array of `FIELDS`.
+    """
+
+    touches: Bool[Array, " places"]
+    distance: Float[Array, " places"]
+    place: Float[Array, "places 3"]
+    frame: Float[Array, "places 3 3"]
+    bodies: Int[Array, "places 2"]
+    surfaces: dict[str, Array]
+
+
+def constraints(scene: Scene, model: Any, data: Any) -> Rows:
+    """Return what joints' limits and contacts ask for; contacts that touch, or the deepest if these are too many.
 
     Args:
         scene: where; only its robot and what is known while tracing.
         model: MJX's.
-        data: MJX's, with places and orientations of all geoms.
+        data: MJX's, with places, orientations and velocities.
     """
-    found = _found(scene, model, data)
-    if not found:
-        return data
-    kept = [_kept(scene, pairs) for _, pairs in sorted(found.items())]
-    dimensions = np.concatenate(
-        [[dimension] * len(one["dist"]) for dimension, one in zip(sorted(found), kept, strict=True)]
+    contact = data._impl.contact.replace(dim=np.zeros(0, int))  # MJX makes the rows of limits alone
+    limits = mjx.make_constraint(model, data.tree_replace({"_impl.contact": contact}))._impl
+    parts = [Rows(jnp.eye(len(limits.efc_D)), limits.efc_J, limits.efc_aref, limits.efc_D)]
+    for dimension, pairs in sorted(_found(scene, model, data).items()):
+        parts.append(_pyramids(dimension, _kept(scene, pairs), model, data))
+    return Rows(
+        jax.scipy.linalg.block_diag(*(part.mix for part in parts)),
+        *(jnp.concatenate([getattr(p, name) for p in parts]) for name in ("directions", "reference", "stiffness")),
     )
-    whole = {name: jnp.concatenate([one[name] for one in kept]) for name in kept[0]}
-    contact = data._impl.contact.replace(**whole, dim=dimensions, geom1=whole["geom"][:, 0], geom2=whole["geom"][:, 1])
-    return data.tree_replace({"_impl.contact": contact})
+
+
+def _pyramids(dimension: int, kept: Kept, model: Any, data: Any) -> Rows:
+    """Return the edges of contacts' friction pyramids; of a contact without friction, its normal.
+
+    MuJoCo's documentation, "Computation": "Constraint model", "Friction cones".
+    """
+    jacobians = jax.vmap(jax.vmap(lambda place, body: _support.jac(model, data, place, body), (None, 0)))
+    moves, turns = (one[:, 1] - one[:, 0] for one in jacobians(kept.place, kept.bodies))
+    directions = [jnp.einsum("cij,cvj->civ", kept.frame, one) for one in (moves, turns)]
+    directions = jnp.concatenate(directions, axis=1)[:, :dimension]
+    # The normal with each other direction, this way and that way; as much of it as the friction allows.
+    edges = max(1, 2 * (dimension - 1))
+    signs = np.zeros((edges, dimension))
+    signs[:, 0] = 1.0
+    signs[np.arange(edges) * (dimension > 1), np.arange(edges) // 2 + (dimension > 1)] = 1.0 - 2.0 * (
+        np.arange(edges) % 2
+    )
+    friction = kept.surfaces["friction"]
+    shares = jnp.concatenate([jnp.ones_like(friction[:, :1]), friction[:, : dimension - 1]], axis=1)
+    mix = shares[:, None, :] * jnp.asarray(signs, shares.dtype)
+
+    resistance = jnp.sum(model.body_invweight0[:, 0][kept.bodies], axis=1)
+    if dimension > 1:
+        square = friction[:, 0] ** 2
+        resistance = resistance * (1 + square) * 2 * square / model.opt.impratio
+    gap = kept.distance - kept.surfaces["includemargin"]
+    solver = kept.surfaces["solref"], kept.surfaces["solimp"], gap
+    spring, damping, impedance = jax.vmap(lambda *given: _constraint._kbi(model, *given))(*solver)
+    softness = jnp.maximum(resistance * (1 - impedance) / impedance, TINY)
+    velocity = jnp.einsum("ced,cd->ce", mix, directions @ data.qvel)
+    reference = -damping[:, None] * velocity - (spring * impedance * gap)[:, None]
+    return Rows(
+        jax.scipy.linalg.block_diag(*mix),
+        directions.reshape(-1, directions.shape[2]),
+        reference.reshape(-1),
+        jnp.repeat(jnp.where(kept.touches, 1 / softness, 0.0), edges),
+    )
 
 
 def _found(scene: Scene, model: Any, data: Any) -> dict[int, Pairs]:
@@ -157,11 +214,9 @@ def _together(parts: list[Pairs]) -> Pairs:
     return Pairs(*arrays, np.concatenate([p.geoms for p in parts]), kinds, surfaces)
 
 
-def _kept(scene: Scene, pairs: Pairs) -> dict[str, Array]:
-    """Return the contacts that are kept, as MJX's arrays by name."""
+def _kept(scene: Scene, pairs: Pairs) -> Kept:
+    """Return the contacts that are kept."""
     bodies = scene.model.geom_bodyid[pairs.geoms]
-    # A contact's geoms are asked for their bodies alone, so the first geom of a body stands for all.
-    geoms = scene.model.body_geomadr[bodies]
     touching = pairs.distance < pairs.surfaces["includemargin"]
     chosen, last = _places(scene.robot, bodies, pairs.kinds, pairs.distance, touching)
     choosing = chosen & (last[:, None] != np.arange(len(bodies)))
@@ -183,15 +238,20 @@ def _kept(scene: Scene, pairs: Pairs) -> dict[str, Array]:
     ]
     numbers = [array.reshape(len(bodies), -1) for array in numbers]
     ends = np.cumsum([array.shape[1] for array in numbers])
-    parts = jnp.split(of(jnp.concatenate(numbers, axis=1)), ends[:-1], axis=1)
-    distance, point, offset, share, towards, axis, *surfaces = parts
-    made = dict(zip(FIELDS, surfaces, strict=True))
-    made["includemargin"] = margin = made["includemargin"][:, 0]
-    made["dist"] = jnp.where(jnp.any(chosen, axis=1), distance[:, 0], margin + APART)
+    distance, point, offset, share, towards, axis, *surfaces = jnp.split(
+        of(jnp.concatenate(numbers, axis=1)), ends[:-1], axis=1
+    )
+    surfaces = dict(zip(FIELDS, surfaces, strict=True))
+    surfaces["includemargin"] = surfaces["includemargin"][:, 0]
     normal = _of_length_1(towards)
-    made["pos"] = point + (offset + share * distance) * normal
-    made["frame"] = _frames(normal, axis, STEEP if scene.robot.is_built_in else TINY)
-    return made | {"geom": of(jnp.asarray(geoms))}
+    return Kept(
+        touches=jnp.any(chosen, axis=1),
+        distance=distance[:, 0],
+        place=point + (offset + share * distance) * normal,
+        frame=_frames(normal, axis, STEEP if scene.robot.is_built_in else TINY),
+        bodies=of(jnp.asarray(bodies)),
+        surfaces=surfaces,
+    )
 
 
 def _places(

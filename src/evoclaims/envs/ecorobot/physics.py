@@ -12,7 +12,7 @@ from jaxtyping import Array, Bool, Float, Int
 from evoclaims.core.foreign import implicit_promotions
 from evoclaims.core.pytree import pytree
 from evoclaims.envs.ecorobot.constraints import cholesky_solve, constrained_acceleration
-from evoclaims.envs.ecorobot.contacts import with_contacts
+from evoclaims.envs.ecorobot.contacts import constraints
 from evoclaims.envs.ecorobot.pose import torso
 from evoclaims.envs.ecorobot.scene import GEOMS, Places, Scene, box_geoms, mjx, on_device
 
@@ -92,17 +92,13 @@ def _accelerated(scene: Scene, model: Any, data: Any, body: Body) -> tuple[Array
     data = mjx.kinematics(model, data)
     data = mjx.com_pos(model, data)
     data = mjx.crb(model, data)
-    data = with_contacts(scene, model, data)
-    data = mjx.make_constraint(model, data)
+    rows = constraints(scene, model, data)
     data = mjx.transmission(model, data)
     data = mjx.fwd_velocity(model, data)
     data = mjx.fwd_actuation(model, data)
     mass = mjx.full_m(model, data)
     force = data.qfrc_passive - data.qfrc_bias + data.qfrc_actuator
-    acceleration = constrained_acceleration(
-        mass, force, body.acceleration, data._impl.efc_J, data._impl.efc_aref, data._impl.efc_D, scene.newton_steps
-    )
-    return acceleration, mass, data
+    return constrained_acceleration(mass, force, body.acceleration, rows, scene.newton_steps), mass, data
 
 
 def _runge_kutta(scene: Scene, model: Any, data: Any, body: Body) -> Body:
