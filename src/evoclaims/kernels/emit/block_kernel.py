@@ -27,8 +27,11 @@ from evoclaims.kernels.trace.expressions import (
 )
 from evoclaims.kernels.trace.interpreter import Numbers
 
-WARPS: Final = {1: 8, 2: 8, 3: 4}
+WARPS: Final = {1: 8, 2: 4, 3: 4}
 """Most warps of a team, by the teams of a block: more have too few registers each."""
+IN_TURNS: Final = 22_000
+"""From so many operations on, blocks of two teams take turns where a GPU has no room for all elements at a time: an
+ant's step is faster so, a half-cheetah's is not."""
 MEMORY: Final = "shared_memory_per_block_optin"
 """jax's name for the bytes of shared memory that a block may have."""
 
@@ -66,10 +69,13 @@ def chosen(results: Sequence[Numbers], elements: int) -> BlockShape | None:
         elements: of the batch.
     """
     numbers = [number for result in results for number in result.flat]
-    if len(everything(numbers)) <= SMALL:
+    operations = len(everything(numbers))
+    if operations <= SMALL:
         return None
     processors, memory = (_of_device(name, usual) for name, usual in (("core_count", 132), (MEMORY, 99 * 1024)))
     teams = -(-elements // (BLOCK * processors))
+    if teams not in WARPS and operations >= IN_TURNS:
+        teams = 2
     warps = WARPS.get(teams, 1)
     while warps > 1:
         plan = schedule(numbers, warps)
