@@ -149,7 +149,6 @@ def variants() -> Iterator[tuple[str, str]]:
 class _World:
     """What a frame needs of a scene besides arrays; equal ones share a trace."""
 
-    kinds: tuple[int, ...]
     robot: Any
     newton_steps: int
     damps_implicitly: bool
@@ -162,7 +161,6 @@ class _Built:
     def __init__(self, world: _World, arrays: Any, blank: Any) -> None:
         vars(self).update(vars(world))
         self.mjx, self.blank = arrays, blank
-        self.model = type("Model", (), {"geom_type": np.array(world.kinds)})
 
 
 @partial(jax.jit, static_argnums=0)
@@ -183,9 +181,10 @@ def furthest(robot: Robot) -> float:
         made = fidelity.frames_of(Scene(robot))
     with jax.enable_x64(True):
         scene = Scene(robot)
-        kinds = _ALIKE.setdefault(robot.contacts, type("Kinds", (), {"touching": 4, "is_built_in": False}))
+        kinds = _ALIKE.setdefault(
+            robot.contacts, type("Kinds", (), {"contacts": robot.contacts, "touching": 4, "is_built_in": False})
+        )
         world = _World(
-            tuple(scene.model.geom_type.tolist()),
             kinds,
             scene.newton_steps,
             scene.damps_implicitly,

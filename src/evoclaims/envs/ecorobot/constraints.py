@@ -1,8 +1,8 @@
-"""MuJoCo's constrained dynamics for few constraints: Newton steps with an exact line search.
+"""MuJoCo's constrained dynamics for few constraints: Newton steps with a line search along straight pieces.
 
 The accelerations a minimize ½ (a - a₀)ᵀ M (a - a₀) + ½ Σᵢ Dᵢ min(0, (J a - r)ᵢ)² (MuJoCo's documentation,
 "Computation", primal problem, pyramidal friction cones). MJX's line search brackets the root, in a loop of several
-hundred operations; the slope along a line is piecewise linear, so its root can be computed directly.
+hundred operations; the slope along a line is piecewise linear, so its root can be found piece by piece.
 """
 
 from __future__ import annotations
