@@ -10,7 +10,12 @@ from every_attribute import TOLERANCE, furthest, with_attribute
 
 from evoclaims.core.errors import UserError
 
-EQUAL = [("flag", "eulerdamp", "disable"), ("joint", "springref", "0.37")]
+EQUAL = [
+    ("flag", "eulerdamp", "disable"),
+    ("flag", "constraint", "disable"),
+    ("flag", "contact", "disable"),
+    ("joint", "springref", "0.37"),
+]
 REFUSED = [
     ("geom", "fluidshape", "ellipsoid", "ellipsoids in a fluid"),
     ("joint", "frictionloss", "0.37", "friction loss"),

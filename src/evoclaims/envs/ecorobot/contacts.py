@@ -36,6 +36,8 @@ STEEP: Final = 0.5
 PLANE, SPHERE, CAPSULE, BOX = (
     int(getattr(mujoco.mjtGeom, f"mjGEOM_{k}")) for k in ("PLANE", "SPHERE", "CAPSULE", "BOX")
 )
+WITHOUT: Final = int(mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+"""The flags with which a custom robot touches nothing."""
 FIELDS: Final = ("includemargin", "friction", "solref", "solimp")
 """What MJX's contacts have of surfaces and their solver."""
 
@@ -99,7 +101,8 @@ def constraints(scene: Scene, model: Any, data: Any) -> Rows:
     contact = data._impl.contact.replace(dim=np.zeros(0, int))  # MJX makes the rows of limits alone
     limits = mjx.make_constraint(model, data.tree_replace({"_impl.contact": contact}))._impl
     parts = [Rows(jnp.eye(len(limits.efc_D)), limits.efc_J, limits.efc_aref, limits.efc_D)]
-    for dimension, pairs in sorted(_found(scene, model, data).items()):
+    found = {} if scene.model.opt.disableflags & WITHOUT else _found(scene, model, data)
+    for dimension, pairs in sorted(found.items()):
         parts.append(_pyramids(dimension, _kept(scene, pairs), model, data))
     return Rows(
         jax.scipy.linalg.block_diag(*(part.mix for part in parts)),
