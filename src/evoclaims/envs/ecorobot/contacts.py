@@ -22,7 +22,7 @@ from evoclaims.core.foreign import Later
 from evoclaims.envs.ecorobot.capsule_box import capsule_on_box
 from evoclaims.envs.ecorobot.constraints import Rows
 from evoclaims.envs.ecorobot.robots import Robot
-from evoclaims.envs.ecorobot.scene import Scene, mjx
+from evoclaims.envs.ecorobot.scene import mjx
 from evoclaims.kernels import seldom
 
 _driver = Later("mujoco.mjx._src.collision_driver")
@@ -90,20 +90,20 @@ class Kept:
     surfaces: dict[str, Array]
 
 
-def constraints(scene: Scene, model: Any, data: Any) -> Rows:
+def constraints(robot: Robot, model: Any, data: Any) -> Rows:
     """Return what joints' limits and contacts ask for; contacts that touch, or the deepest if these are too many.
 
     Args:
-        scene: where; only its robot and what is known while tracing.
+        robot: says how many contacts are kept.
         model: MJX's.
         data: MJX's, with places, orientations and velocities.
     """
     contact = data._impl.contact.replace(dim=np.zeros(0, int))  # MJX makes the rows of limits alone
     limits = mjx.make_constraint(model, data.tree_replace({"_impl.contact": contact}))._impl
     parts = [Rows(jnp.eye(len(limits.efc_D)), limits.efc_J, limits.efc_aref, limits.efc_D)]
-    found = {} if scene.model.opt.disableflags & WITHOUT else _found(scene, model, data)
+    found = {} if model.opt.disableflags & WITHOUT else _found(model, data)
     for dimension, pairs in sorted(found.items()):
-        parts.append(_pyramids(dimension, _kept(scene, pairs), model, data))
+        parts.append(_pyramids(dimension, _kept(robot, pairs, model), model, data))
     return Rows(
         jax.scipy.linalg.block_diag(*(part.mix for part in parts)),
         *(jnp.concatenate([getattr(p, name) for p in parts]) for name in ("directions", "reference", "stiffness")),
@@ -148,17 +148,17 @@ def _pyramids(dimension: int, kept: Kept, model: Any, data: Any) -> Rows:
     )
 
 
-def _found(scene: Scene, model: Any, data: Any) -> dict[int, Pairs]:
+def _found(model: Any, data: Any) -> dict[int, Pairs]:
     """Return the contacts of all pairs that could touch, by the dimension of their friction."""
     parts: dict[int, list[Pairs]] = {}
-    known = _driver._geom_groups(scene.model)
+    known = _driver._geom_groups(model)
     for (key, geoms), shared in zip(known.items(), _driver._contact_groups(model, data).values(), strict=True):
         pairs = _of_spheres(key, np.array(geoms)[:, :2], model, data) or _by_mjx(
             key, np.array(geoms)[:, :2], model, data
         )
         each = len(pairs.geoms) // len(geoms)
         surfaces = {name: jnp.repeat(getattr(shared, name), each, axis=0) for name in FIELDS}
-        parts.setdefault(key.condim, []).append(_from_the_world(scene, replace(pairs, surfaces=surfaces)))
+        parts.setdefault(key.condim, []).append(_from_the_world(model, replace(pairs, surfaces=surfaces)))
     return {dimension: _together(pairs) for dimension, pairs in parts.items()}
 
 
@@ -194,9 +194,9 @@ def _by_mjx(key: Any, geoms: NDArray[np.int64], model: Any, data: Any) -> Pairs:
     return Pairs(distance, place, none, none, normal, axis, geoms, np.zeros(len(geoms), np.int64), {})
 
 
-def _from_the_world(scene: Scene, pairs: Pairs) -> Pairs:
+def _from_the_world(model: Any, pairs: Pairs) -> Pairs:
     """Return the same contacts, a geom of the world first in each that has one."""
-    one, other = scene.model.geom_bodyid[pairs.geoms.T]
+    one, other = model.geom_bodyid[pairs.geoms.T]
     turned = (other == 0) & (one > 0)
     sign = jnp.where(turned, -1.0, 1.0).astype(pairs.distance.dtype)
     return replace(
@@ -217,11 +217,11 @@ def _together(parts: list[Pairs]) -> Pairs:
     return Pairs(*arrays, np.concatenate([p.geoms for p in parts]), kinds, surfaces)
 
 
-def _kept(scene: Scene, pairs: Pairs) -> Kept:
+def _kept(robot: Robot, pairs: Pairs, model: Any) -> Kept:
     """Return the contacts that are kept."""
-    bodies = scene.model.geom_bodyid[pairs.geoms]
+    bodies = model.geom_bodyid[pairs.geoms]
     touching = pairs.distance < pairs.surfaces["includemargin"]
-    chosen, last = _places(scene.robot, bodies, pairs.kinds, pairs.distance, touching)
+    chosen, last = _places(robot, bodies, pairs.kinds, pairs.distance, touching)
     choosing = chosen & (last[:, None] != np.arange(len(bodies)))
 
     def of(values: Array) -> Array:
@@ -251,7 +251,7 @@ def _kept(scene: Scene, pairs: Pairs) -> Kept:
         touches=jnp.any(chosen, axis=1),
         distance=distance[:, 0],
         place=point + (offset + share * distance) * normal,
-        frame=_frames(normal, axis, STEEP if scene.robot.is_built_in else TINY),
+        frame=_frames(normal, axis, STEEP if robot.is_built_in else TINY),
         bodies=of(jnp.asarray(bodies)),
         surfaces=surfaces,
     )

@@ -92,7 +92,7 @@ def _accelerated(scene: Scene, model: Any, data: Any, body: Body) -> tuple[Array
     data = mjx.kinematics(model, data)
     data = mjx.com_pos(model, data)
     data = mjx.crb(model, data)
-    rows = constraints(scene, model, data)
+    rows = constraints(scene.robot, model, data)
     data = mjx.transmission(model, data)
     data = mjx.fwd_velocity(model, data)
     data = mjx.fwd_actuation(model, data)
