@@ -181,9 +181,8 @@ def furthest(robot: Robot) -> float:
         made = fidelity.frames_of(Scene(robot))
     with jax.enable_x64(True):
         scene = Scene(robot)
-        kinds = _ALIKE.setdefault(
-            robot.contacts, type("Kinds", (), {"contacts": robot.contacts, "touching": 4, "is_built_in": False})
-        )
+        numbers = {"touching": 4, "contacts": robot.contacts, "is_built_in": False}
+        kinds = _ALIKE.setdefault(robot.contacts, type("Kinds", (), numbers))
         world = _World(
             kinds,
             scene.newton_steps,

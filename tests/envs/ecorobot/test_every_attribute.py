@@ -11,7 +11,9 @@ from every_attribute import TOLERANCE, furthest, with_attribute
 from evoclaims.core.errors import UserError
 
 EQUAL = [
-    *(("flag", flag, "disable") for flag in ("constraint", "contact", "eulerdamp", "limit")),
+    ("flag", "eulerdamp", "disable"),
+    ("flag", "constraint", "disable"),
+    ("flag", "contact", "disable"),
     ("joint", "springref", "0.37"),
 ]
 REFUSED = [

@@ -36,6 +36,8 @@ STEEP: Final = 0.5
 PLANE, SPHERE, CAPSULE, BOX = (
     int(getattr(mujoco.mjtGeom, f"mjGEOM_{k}")) for k in ("PLANE", "SPHERE", "CAPSULE", "BOX")
 )
+WITHOUT: Final = int(mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+"""The flags with which a custom robot touches nothing."""
 FIELDS: Final = ("includemargin", "friction", "solref", "solimp")
 """What MJX's contacts have of surfaces and their solver."""
 
@@ -92,15 +94,16 @@ def constraints(robot: Robot, model: Any, data: Any) -> Rows:
     """Return what joints' limits and contacts ask for; contacts that touch, or the deepest if these are too many.
 
     Args:
-        robot: how many contacts are kept.
-        model: MJX's; its types and ids are known while tracing.
+        robot: says how many contacts are kept.
+        model: MJX's.
         data: MJX's, with places, orientations and velocities.
     """
     contact = data._impl.contact.replace(dim=np.zeros(0, int))  # MJX makes the rows of limits alone
     limits = mjx.make_constraint(model, data.tree_replace({"_impl.contact": contact}))._impl
     parts = [Rows(jnp.eye(len(limits.efc_D)), limits.efc_J, limits.efc_aref, limits.efc_D)]
-    for dimension, pairs in sorted(_found(model, data).items()):
-        parts.append(_pyramids(dimension, _kept(robot, model, pairs), model, data))
+    found = {} if model.opt.disableflags & WITHOUT else _found(model, data)
+    for dimension, pairs in sorted(found.items()):
+        parts.append(_pyramids(dimension, _kept(robot, pairs, model), model, data))
     return Rows(
         jax.scipy.linalg.block_diag(*(part.mix for part in parts)),
         *(jnp.concatenate([getattr(p, name) for p in parts]) for name in ("directions", "reference", "stiffness")),
@@ -214,7 +217,7 @@ def _together(parts: list[Pairs]) -> Pairs:
     return Pairs(*arrays, np.concatenate([p.geoms for p in parts]), kinds, surfaces)
 
 
-def _kept(robot: Robot, model: Any, pairs: Pairs) -> Kept:
+def _kept(robot: Robot, pairs: Pairs, model: Any) -> Kept:
     """Return the contacts that are kept."""
     bodies = model.geom_bodyid[pairs.geoms]
     touching = pairs.distance < pairs.surfaces["includemargin"]
