@@ -149,6 +149,7 @@ def variants() -> Iterator[tuple[str, str]]:
 class _World:
     """What a frame needs of a scene besides arrays; equal ones share a trace."""
 
+    kinds: tuple[int, ...]
     robot: Any
     newton_steps: int
     damps_implicitly: bool
@@ -161,6 +162,7 @@ class _Built:
     def __init__(self, world: _World, arrays: Any, blank: Any) -> None:
         vars(self).update(vars(world))
         self.mjx, self.blank = arrays, blank
+        self.model = type("Model", (), {"geom_type": np.array(world.kinds)})
 
 
 @partial(jax.jit, static_argnums=0)
@@ -184,6 +186,7 @@ def furthest(robot: Robot) -> float:
         numbers = {"touching": 4, "contacts": robot.contacts, "is_built_in": False}
         kinds = _ALIKE.setdefault(robot.contacts, type("Kinds", (), numbers))
         world = _World(
+            tuple(scene.model.geom_type.tolist()),
             kinds,
             scene.newton_steps,
             scene.damps_implicitly,

@@ -148,9 +148,6 @@ def _pyramids(dimension: int, kept: Kept, model: Any, data: Any) -> Rows:
 
 def _found(model: Any, data: Any) -> dict[int, Pairs]:
     """Return the contacts of all pairs that could touch, by the dimension of their friction."""
-    flags = mujoco.mjtDisableBit
-    if model.opt.disableflags & (flags.mjDSBL_CONTACT | flags.mjDSBL_CONSTRAINT):
-        return {}
     parts: dict[int, list[Pairs]] = {}
     known = _driver._geom_groups(model)
     for (key, geoms), shared in zip(known.items(), _driver._contact_groups(model, data).values(), strict=True):
