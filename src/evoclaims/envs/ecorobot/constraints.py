@@ -55,8 +55,8 @@ class Rows:
     """Constraints that only push.
 
     Attributes:
-        mix: of directions, with numbers known while tracing; a friction pyramid's edges are the normal and a tangent, so
-            four of them share three directions.
+        mix: of directions, with numbers known while tracing; a friction pyramid's edges are the normal and a tangent,
+            so four of them share three directions.
         directions: in the space of velocities; mix · directions is J.
         reference: r, per s².
         stiffness: D; 0 where nothing can push.
