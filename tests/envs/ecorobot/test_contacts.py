@@ -17,10 +17,11 @@ from custom_robots import Texts
 from numpy.typing import NDArray
 
 from evoclaims.core.foreign import implicit_promotions
-from evoclaims.envs.ecorobot import contacts, stones
+from evoclaims.envs.ecorobot import contacts, model_files, stones
+from evoclaims.envs.ecorobot import scene as scene_module
 from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.robots import ANT, HALF_CHEETAH, HUMANOID, SIMPLE_ROB, Robot
-from evoclaims.envs.ecorobot.scene import Scene, mjx
+from evoclaims.envs.ecorobot.scene import Scene, mjx, touching
 from evoclaims.kernels import in_numpy
 
 Numbers = NDArray[np.float64]
@@ -256,3 +257,41 @@ def test_no_more_limbs_touch_twice_than_have_places() -> None:
         for most in range(1, sum(sizes) + 1):
             exact = max(seconds for count, seconds in kept if count <= most)
             assert contacts._seconds(np.array(sizes), most) == exact
+
+
+def _frames(model: mujoco.MjModel, positions: Numbers) -> tuple[Numbers, int]:
+    """Return where C MuJoCo's frames from these positions lead, and in how many something touched."""
+    data, random, touched = mujoco.MjData(model), np.random.default_rng(2), 0
+    after = []
+    for position in positions:
+        mujoco.mj_resetData(model, data)
+        data.qpos[:], data.qvel[:] = position, random.normal(size=model.nv)
+        data.ctrl[:] = random.uniform(-1.0, 1.0, model.nu)
+        mujoco.mj_step(model, data)
+        touched += data.ncon > 0
+        after.append(np.concatenate([data.qpos, data.qvel * model.opt.timestep]))
+    return np.array(after), touched
+
+
+def test_an_ant_moves_as_before_its_bodies_without_joints_were_merged(monkeypatch: pytest.MonkeyPatch) -> None:
+    positions = _ants(np.random.default_rng(3))
+    merged = Scene(ANT, stones.WALLS).whole
+    compiled = model_files.compiled
+
+    def unmerged(name: str, spec: Any) -> mujoco.MjModel:
+        spec.compiler.fusestatic = False
+        return compiled(name, spec)
+
+    monkeypatch.setattr(model_files, "compiled", unmerged)
+    apart = scene_module._compiled.__wrapped__(ANT, stones.WALLS)
+    assert apart.nbody == merged.nbody + 4
+    (one, touched), (other, _) = _frames(merged, positions), _frames(apart, positions)
+    assert touched >= 40
+    np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-12)
+
+
+def test_a_humanoid_s_feet_stay_bodies_of_their_own() -> None:
+    """They touch the floor, and how hard a contact is depends on the body."""
+    model = Scene(HUMANOID).whole
+    assert model.nbody == mujoco.MjModel.from_xml_path(HUMANOID.file).nbody
+    assert set(model.body_jntnum[np.unique(model.geom_bodyid[touching(model)])]) == {0}
