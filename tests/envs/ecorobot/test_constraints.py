@@ -79,7 +79,7 @@ def _roots(line: Line, pieces: int, monkeypatch: pytest.MonkeyPatch) -> Numbers:
 
 @pytest.mark.parametrize("rows", [4, 12, 40])
 def test_straight_lines_lead_to_the_root(rows: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each is nearer than those before it on its side: where a row pushes between two places, it does at one of them."""
+    """Each is nearer than those before on its side: what pushes between two places does at one of them."""
     line = _random_lines(2_000, rows, 5)
     exact = _exact(line)
     size = np.abs(line[0]) + np.sum(line[2] * np.abs(line[4] * line[3]), axis=1)
@@ -103,7 +103,7 @@ def test_a_search_that_ends_early_costs_less_than_the_start(rows: int, monkeypat
 
 
 def _recorded(task: RobotTask) -> tuple[Line, Numbers]:
-    """Return the lines and the roots that were found along episodes, of frames that begin with something that pushes."""
+    """Return the lines, and the roots that were found along episodes, of frames where something pushes at first."""
     scene, random = task.scene, np.random.default_rng(0)
     held: list[Any] = []
 

@@ -26,8 +26,8 @@ pytestmark = pytest.mark.slow
 
 ROBOTS, STEPS, COMPARED, EVERY = 40, 200, 8, 8
 TASKS: dict[str, RobotTask] = {
-    # Fewer contacts in most steps than robots have: both ways of these kernels are taken. An ant's is whole where a foot
-    # touches two walls, or its centre is inside one.
+    # Fewer contacts in most steps than robots have: both ways of these kernels are taken. An ant's is whole where a
+    # foot touches two walls, or its centre is inside one.
     "stones": SteppingStones(robot=replace(SIMPLE_ROB, touching=0)),
     "obstacles": Obstacles(robot=replace(HALF_CHEETAH, touching=2)),
     "ant": SteppingStones(robot=ANT),
