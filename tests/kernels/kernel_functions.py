@@ -172,6 +172,15 @@ FUNCTIONS: dict[str, tuple[Callable[..., Any], tuple[Any, ...]]] = {
         lambda x: (jnp.sort(TABLE * x, axis=0), jnp.argmax(TABLE * x, axis=0), jnp.argmin(TABLE * x)),
         (X,),
     ),
+    "choices of equals": (
+        lambda x, y: (
+            jnp.where(x > 0, y, jnp.where(y > 0, y, x)),
+            jnp.where(x > 0, 1.0, jnp.where(y > 0, 1.0, jnp.where(x > y, 2.0, 1.0))),
+            jnp.where(x > 0, x, jnp.where(y > 0, y, x)),
+            jnp.where(x > 0, y > x, jnp.where(y > 0, y > x, x > 1)),
+        ),
+        (X, Y),
+    ),
     "a loop": (_carries, (X, Y)),
     "a loop with numbers from outside": (_with_numbers_from_outside, (X, Y)),
     "loops in a loop": (_nested, (X,)),

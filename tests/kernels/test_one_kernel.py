@@ -217,7 +217,8 @@ def test_sorting_keeps_the_order_of_equals(values: list[float]) -> None:
     x = jnp.round(jnp.array([values], jnp.float32)) + 0.0  # without -0, which jax puts before 0
 
     def both(x: Any) -> Any:
-        return jnp.argsort(x), jax.lax.top_k(x, 3)
+        columns = jax.lax.sort((x, jnp.arange(6), x * x > 1.0, x[::-1] > 0.0), num_keys=1)
+        return jnp.argsort(x), jax.lax.top_k(x, 3), jax.lax.top_k(x, 6), columns
 
     made, expected = jax.vmap(one_kernel(both, "This"))(x), jax.vmap(both)(x)
     jax.tree.map(np.testing.assert_array_equal, made, expected)

@@ -270,9 +270,11 @@ def _places(
     if n <= most:
         touching = jnp.concatenate([touching[:usual], seldom(touching[usual:])])
         return np.eye(n, dtype=bool) & touching, np.arange(n)
-    deep = distance <= -jax.lax.top_k(-distance, most)[0][-1]
-    kept = touching & (deep | ~unusual(jnp.sum(touching) > most))
     earlier = np.tri(n, k=-1, dtype=bool)
+    limit = -jax.lax.top_k(-distance, most)[0][-1]
+    deeper, level = distance < limit, distance == limit
+    deep = deeper | level & (jnp.sum(level & earlier, axis=1) < most - jnp.sum(deeper))  # of equals the first, as MJX
+    kept = touching & (deep | ~unusual(jnp.sum(touching) > most))
     _, limbs = np.unique(np.stack([bodies[:, 1], kinds]), axis=1, return_inverse=True)
     if np.any(bodies[:, 0]) or max(limbs) >= most:
         at = jnp.sum(kept & earlier, axis=1) == np.arange(most)[:, None]
