@@ -24,7 +24,7 @@ from evoclaims.kernels.trace.in_numpy import ELEMENTARY
 
 pytestmark = pytest.mark.slow
 
-ROBOTS, STEPS, COMPARED, EVERY = 40, 200, 8, 8
+ROBOTS, STEPS, COMPARED, EVERY = 40, 200, 8, 2
 TASKS: dict[str, RobotTask] = {
     # Fewer contacts in most steps than robots have: both ways of these kernels are taken. An ant's is whole where a
     # foot touches two walls, or its centre is inside one.
@@ -37,11 +37,16 @@ TASKS: dict[str, RobotTask] = {
 NEARLY_ALL = {"stones": 1e-5, "obstacles": 1e-3, "ant": 1e-3}
 ANY = {"stones": 1e-4, "obstacles": 1.0, "ant": 1.0}
 
+# Of the frames of eight robots, more than this go the whole way; an ant's seldom do.
+LEAST = {"stones": 0.01, "obstacles": 0.01, "ant": 0.0}
+
 
 def _run(task: RobotTask) -> tuple[TaskState, TaskState, Any]:
     """Return the states before and after each step, and its action; leaves [steps, robots, …]."""
     state = jax.vmap(task.reset, (0, None))(jax.random.split(jax.random.key(0), ROBOTS), jnp.int32(0))
-    held = jax.random.uniform(jax.random.key(1), (STEPS // 10, ROBOTS, task.action_size), minval=-1.0, maxval=1.0)
+    shape = (STEPS // 10 + 1, ROBOTS, task.action_size)
+    *held, leaning = jax.random.uniform(jax.random.key(1), shape, minval=-1.0, maxval=1.0)
+    held = jnp.clip(jnp.stack([one + leaning for one in held]), -1.0, 1.0)  # each goes its way, to a wall
 
     def step(state: TaskState, action: Any) -> Any:
         after = jax.vmap(task.step)(state, action)
@@ -104,7 +109,7 @@ def test_both_ways_of_a_step_are_taken(name: str, monkeypatch: pytest.MonkeyPatc
     # The robots of a vector go the same way, in each frame of a step.
     frames, width = TASKS[name].robot.frames, math.gcd(lanes(), ROBOTS)
     whole = np.array(given).reshape(frames, -1, states // width, width).any(axis=(1, 3))
-    assert 0.01 < whole.mean() < 0.9
+    assert LEAST[name] < whole.mean() < 0.9
 
 
 @pytest.mark.parametrize("name", TASKS)

@@ -115,10 +115,10 @@ def _pyramids(dimension: int, kept: Kept, model: Any, data: Any) -> Rows:
 
     MuJoCo's documentation, "Computation": "Constraint model", "Friction cones".
     """
-    jacobians = jax.vmap(jax.vmap(lambda place, body: _support.jac(model, data, place, body), (None, 0)))
+    jacobians: Any = jax.vmap(jax.vmap(lambda place, body: _support.jac(model, data, place, body), (None, 0)))
     moves, turns = (one[:, 1] - one[:, 0] for one in jacobians(kept.place, kept.bodies))
-    directions = [jnp.einsum("cij,cvj->civ", kept.frame, one) for one in (moves, turns)]
-    directions = jnp.concatenate(directions, axis=1)[:, :dimension]
+    both = [jnp.einsum("cij,cvj->civ", kept.frame, one) for one in (moves, turns)]
+    directions = jnp.concatenate(both, axis=1)[:, :dimension]
     # The normal with each other direction, this way and that way; as much of it as the friction allows.
     tangents = range(1, dimension)
     signs = np.array(
@@ -161,7 +161,7 @@ def _found(model: Any, data: Any) -> dict[int, Pairs]:
 
 def _of_spheres(key: Any, geoms: NDArray[np.int64], model: Any, data: Any) -> Pairs | None:
     """Return the contacts of spheres with planes, boxes or capsules, as C computes them; None for other types."""
-    types = tuple(map(int, key.types))
+    types = int(key.types[0]), int(key.types[1])
     nearest = {(PLANE, SPHERE): _to_plane, (SPHERE, BOX): _to_box, (SPHERE, CAPSULE): _to_capsule}.get(types)
     if nearest is None:
         return None
@@ -208,10 +208,10 @@ def _from_the_world(model: Any, pairs: Pairs) -> Pairs:
 def _together(parts: list[Pairs]) -> Pairs:
     """Return all of them, in this order."""
     names = ("distance", "point", "offset", "share", "towards", "axis")
-    arrays = [jnp.concatenate([getattr(p, name) for p in parts]) for name in names]
+    arrays: dict[str, Any] = {name: jnp.concatenate([getattr(p, name) for p in parts]) for name in names}
     surfaces = {name: jnp.concatenate([p.surfaces[name] for p in parts]) for name in FIELDS}
     kinds = np.repeat(np.arange(len(parts)), [len(p.geoms) for p in parts])
-    return Pairs(*arrays, np.concatenate([p.geoms for p in parts]), kinds, surfaces)
+    return Pairs(**arrays, geoms=np.concatenate([p.geoms for p in parts]), kinds=kinds, surfaces=surfaces)
 
 
 def _kept(robot: Robot, pairs: Pairs, model: Any) -> Kept:
@@ -238,10 +238,10 @@ def _kept(robot: Robot, pairs: Pairs, model: Any) -> Kept:
     ]
     numbers = [array.reshape(len(bodies), -1) for array in numbers]
     ends = np.cumsum([array.shape[1] for array in numbers])
-    distance, point, offset, share, towards, axis, *surfaces = jnp.split(
+    distance, point, offset, share, towards, axis, *rest = jnp.split(
         of(jnp.concatenate(numbers, axis=1)), ends[:-1], axis=1
     )
-    surfaces = dict(zip(FIELDS, surfaces, strict=True))
+    surfaces = dict(zip(FIELDS, rest, strict=True))
     surfaces["includemargin"] = surfaces["includemargin"][:, 0]
     normal = _of_length_1(towards)
     return Kept(
@@ -269,7 +269,7 @@ def _places(
     unusual = seldom if usual < most else jnp.asarray
     if n <= most:
         touching = jnp.concatenate([touching[:usual], seldom(touching[usual:])])
-        return np.eye(n, dtype=bool) & touching, np.arange(n)
+        return jnp.asarray(np.eye(n, dtype=bool)) & touching, np.arange(n)
     earlier = np.tri(n, k=-1, dtype=bool)
     limit = -jax.lax.top_k(-distance, most)[0][-1]
     deeper, level = distance < limit, distance == limit
