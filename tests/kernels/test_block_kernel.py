@@ -80,7 +80,7 @@ def test_a_loop_in_a_loop_is_left_to_one_warp() -> None:
 
 @pytest.mark.parametrize(
     ("elements", "warps", "teams"),
-    [(1, 8, 1), (132 * 32, 8, 1), (132 * 32 + 1, 8, 2), (10_240, 4, 3), (3 * 132 * 32, 4, 3)],
+    [(1, 8, 1), (132 * 32, 8, 1), (132 * 32 + 1, 4, 2), (10_240, 4, 3), (3 * 132 * 32, 4, 3)],
 )
 def test_all_elements_are_computed_at_once_by_as_many_warps_as_have_registers(
     elements: int, warps: int, teams: int, monkeypatch: pytest.MonkeyPatch
@@ -99,6 +99,16 @@ def test_a_warp_has_elements_of_its_own_where_sharing_is_no_faster_or_impossible
     monkeypatch.setattr(block_kernel, "SMALL", 10)
     assert block_kernel.chosen(results, 1) is not None
     assert block_kernel.chosen(results, 3 * 132 * 32 + 1) is None  # elements enough for all warps
+
+
+def test_blocks_of_a_long_kernel_take_turns_where_elements_are_enough_for_all_warps(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(block_kernel, "SMALL", 10)
+    monkeypatch.setattr(block_kernel, "IN_TURNS", 11)
+    shape = block_kernel.chosen(_kernel(lambda x: jnp.sin(x) * x[::-1], (jnp.ones((1, 4)),)).results, 3 * 132 * 32 + 1)
+    assert shape is not None
+    assert (shape.warps, shape.teams) == (4, 2)
 
 
 def test_fewer_warps_share_the_work_where_shared_memory_is_scarce(monkeypatch: pytest.MonkeyPatch) -> None:
