@@ -116,10 +116,8 @@ def mujoco_warp(task: RobotTask, environments: int, steps: int) -> Callable[[], 
     mujoco.mj_forward(model, data)
     # Room for twice the contacts that ours keeps, of four rows each, and for every joint's limit.
     contacts = 2 * task.robot.contacts
-    theirs, worlds = (
-        mjw.put_model(model),
-        mjw.put_data(model, data, nworld=environments, nconmax=contacts, njmax=4 * contacts + model.njnt),
-    )
+    theirs = mjw.put_model(model)
+    worlds = mjw.put_data(model, data, nworld=environments, nconmax=contacts, njmax=4 * contacts + model.njnt)
     warp.copy(worlds.qpos, warp.array(start, dtype=float))
     random = np.random.default_rng(0)
     actions = [warp.array(random.uniform(-1, 1, (environments, model.nu)), dtype=float) for _ in range(-(-steps // 10))]

@@ -37,7 +37,7 @@ TASKS: dict[str, RobotTask] = {
 NEARLY_ALL = {"stones": 1e-5, "obstacles": 1e-3, "ant": 1e-3}
 ANY = {"stones": 1e-4, "obstacles": 1.0, "ant": 1.0}
 
-# Of the frames of eight robots, more than this go the whole way; an ant's seldom do.
+# Of the frames of a vector's robots, more than this go the whole way; an ant's seldom do.
 LEAST = {"stones": 0.01, "obstacles": 0.01, "ant": 0.0}
 
 

@@ -126,12 +126,12 @@ def _root(
 ) -> Float[Array, ""]:
     """Return where slope + t curvature + Σᵢ Dᵢ vᵢ min(0, oᵢ + t vᵢ) is 0.
 
-    It rises in t and bends only where a row turns on or off. The rows that push at some t make a straight line, and
-    where the same rows push at its root, that is the root of all. Begins at 1, the minimum if no row turns.
+    It rises in t and bends only where a row turns on or off. The rows that push at some t make a straight line. If the
+    same rows push at the line's root, that is the root. Begins at 1, the minimum if no row turns.
 
-    No line leads further away than those before it: a row that pushes anywhere between two places pushes at one of
-    them, so between them all rises less than by the sum of both lines' slopes. Hence a root that is missed on one side
-    of all's root is nearer to it than those before on that side, 0 included, and the right line is found at last.
+    A line's root may miss, but then it is nearer than all tries before on its side, and than 0. The reason: a row that
+    pushes anywhere between two tries pushes at one of them. So between them the slope rises by less than both lines
+    do together. Hence no search goes in circles, and with enough lines each would end.
     """
     t = jnp.ones(())
     for _ in range(PIECES):

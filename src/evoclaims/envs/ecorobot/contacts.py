@@ -1,14 +1,14 @@
-"""Where a robot touches the world, and which of these contacts a step keeps: MJX's, in a third of its operations.
+"""Where a robot touches the world, and which contacts a step keeps: MJX's, in far fewer operations.
 
 MJX has one algorithm for all convex shapes, makes a frame for every pair of geoms that could touch, sorts all of them
 by depth, and allows for any two bodies in each that it keeps. Here spheres and capsules on boxes have formulas of
-their own, only contacts that are kept get frames, and they are sorted only where more touch than are kept. If each
+their own. Only contacts that are kept get frames. They are sorted only where more touch than are kept. Where each
 limb has a place of its own among them, its body is known while tracing, and so are the zeros of its Jacobian.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 import jax
@@ -54,8 +54,10 @@ class Pairs:
         towards: from the first geom to the second, of any length.
         axis: along which the friction pyramid lies; 0 where only the normal decides.
         geoms: MuJoCo's ids, known while tracing.
-        kinds: what touches what: equal numbers for the same two types of geoms.
+        kinds: the group of each, by the types of its two geoms.
         surfaces: each array of `FIELDS`.
+
+    The last two are what MJX says of pairs; formulas for shapes leave them empty.
     """
 
     distance: Array
@@ -65,8 +67,8 @@ class Pairs:
     towards: Array
     axis: Array
     geoms: NDArray[np.int64]
-    kinds: NDArray[np.int64]
-    surfaces: dict[str, Array]
+    kinds: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    surfaces: dict[str, Array] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -78,7 +80,7 @@ class Kept:
         distance: less than 0, m.
         place: between the surfaces, in the middle.
         frame: the normal and two tangents, as rows.
-        bodies: MuJoCo's ids; the world or the first of two robots' comes first.
+        bodies: MuJoCo's ids of both; the world comes first.
         surfaces: each array of `FIELDS`.
     """
 
@@ -149,13 +151,14 @@ def _pyramids(dimension: int, kept: Kept, model: Any, data: Any) -> Rows:
 def _found(model: Any, data: Any) -> dict[int, Pairs]:
     """Return the contacts of all pairs that could touch, by the dimension of their friction."""
     parts: dict[int, list[Pairs]] = {}
-    known = _driver._geom_groups(model)
-    for (key, geoms), shared in zip(known.items(), _driver._contact_groups(model, data).values(), strict=True):
-        ids = np.array(geoms)[:, :2]
+    geoms, surfaces = _driver._geom_groups(model), _driver._contact_groups(model, data)
+    for kind, key in enumerate(geoms):
+        ids = np.array(geoms[key])[:, :2]
         pairs = _of_spheres(key, ids, model, data) or _by_mjx(key, ids, model, data)
         each = len(pairs.geoms) // len(ids)
-        surfaces = {name: jnp.repeat(getattr(shared, name), each, axis=0) for name in FIELDS}
-        parts.setdefault(key.condim, []).append(_from_the_world(model, replace(pairs, surfaces=surfaces)))
+        theirs = {name: jnp.repeat(getattr(surfaces[key], name), each, axis=0) for name in FIELDS}
+        pairs = replace(pairs, kinds=np.full(len(pairs.geoms), kind), surfaces=theirs)
+        parts.setdefault(key.condim, []).append(_from_the_world(model, pairs))
     return {dimension: _together(pairs) for dimension, pairs in parts.items()}
 
 
@@ -170,7 +173,7 @@ def _of_spheres(key: Any, geoms: NDArray[np.int64], model: Any, data: Any) -> Pa
     centre, radius = data.geom_xpos[sphere], model.geom_size[sphere][:, 0]
     gap, towards = nearest(centre - data.geom_xpos[other], data.geom_xmat[other], model.geom_size[other])
     half, none = jnp.full_like(radius, 0.5), jnp.zeros_like(centre)
-    return Pairs(gap - radius, centre, radius, half, towards, none, geoms, np.zeros(len(geoms), np.int64), {})
+    return Pairs(gap - radius, centre, radius, half, towards, none, geoms)
 
 
 def _by_mjx(key: Any, geoms: NDArray[np.int64], model: Any, data: Any) -> Pairs:
@@ -188,7 +191,7 @@ def _by_mjx(key: Any, geoms: NDArray[np.int64], model: Any, data: Any) -> Pairs:
     geoms = np.repeat(geoms, len(distance) // len(geoms), axis=0)
     lies = types == (PLANE, CAPSULE)
     none, axis = jnp.zeros_like(distance), data.geom_xmat[geoms[:, 1]][:, :, 2] if lies else jnp.zeros_like(place)
-    return Pairs(distance, place, none, none, normal, axis, geoms, np.zeros(len(geoms), np.int64), {})
+    return Pairs(distance, place, none, none, normal, axis, geoms)
 
 
 def _from_the_world(model: Any, pairs: Pairs) -> Pairs:
@@ -210,8 +213,8 @@ def _together(parts: list[Pairs]) -> Pairs:
     names = ("distance", "point", "offset", "share", "towards", "axis")
     arrays: dict[str, Any] = {name: jnp.concatenate([getattr(p, name) for p in parts]) for name in names}
     surfaces = {name: jnp.concatenate([p.surfaces[name] for p in parts]) for name in FIELDS}
-    kinds = np.repeat(np.arange(len(parts)), [len(p.geoms) for p in parts])
-    return Pairs(**arrays, geoms=np.concatenate([p.geoms for p in parts]), kinds=kinds, surfaces=surfaces)
+    geoms, kinds = (np.concatenate(known) for known in zip(*((p.geoms, p.kinds) for p in parts), strict=True))
+    return Pairs(**arrays, geoms=geoms, kinds=kinds, surfaces=surfaces)
 
 
 def _kept(robot: Robot, pairs: Pairs, model: Any) -> Kept:

@@ -40,7 +40,7 @@ class Robot:
         velocity_limit: shown velocities are clipped to it.
         contacts: most contacts kept, the nearest ones.
         touching: how many contacts touch at a time in most steps. Steps with more take longer, with the same results.
-            Where what limbs can touch (the floor, boxes) is no more than is kept, each has a place, and this is unused.
+            Where each limb has places of its own (an ant), only whether it is below `contacts` matters.
         body: a hash of what it is made of, part of its trials' ids; None for the built-in robots, whose files stay.
 
     A built-in robot's file is simulated as the paper's code does: one iteration of the solver, explicit damping. Any
