@@ -258,16 +258,28 @@ def test_a_number_of_processes_is_one_or_more(monkeypatch: pytest.MonkeyPatch) -
 
 
 @pytest.mark.parametrize(
-    ("text", "found", "alone"),
-    [("1", 4, True), ("auto", 1, True), ("auto", 4, False), ("2", 1, False), ("auto", 0, False)],
+    ("text", "found", "mps", "alone"),
+    [
+        ("1", 4, False, True),
+        ("1", 1, True, True),
+        ("auto", 1, False, True),
+        ("auto", 1, True, False),
+        ("auto", 4, False, False),
+        ("2", 1, False, False),
+        ("auto", 0, False, False),
+        ("auto", 0, True, False),
+    ],
 )
 def test_a_command_whose_processes_have_gpus_keeps_off_these_itself(
-    text: str, found: int, alone: bool, monkeypatch: pytest.MonkeyPatch
+    text: str, found: int, mps: bool, alone: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     off: list[bool] = []
+    monkeypatch.setattr(gpus, "side_by_side", lambda: mps)
     monkeypatch.setattr(gpus, "gpus", lambda device: tuple(map(str, range(found))))
     monkeypatch.setattr("evoclaims.trials.devices.keep_off_gpus", lambda: off.append(True))
-    assert host_of(text, "auto").alone == alone
+    host = host_of(text, "auto")
+    assert host.alone == alone
+    assert host.processes == (2 * found if mps and text == "auto" else AUTO if text == "auto" else int(text))
     assert off == [True] * (found > 0 and not alone)
 
 

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import importlib.metadata
+import os
+import subprocess
+import sys
 from collections import Counter
 from pathlib import Path
 from types import SimpleNamespace
@@ -68,3 +71,16 @@ def test_processes_have_gpus_of_their_own_or_share_one_and_its_memory(count: int
 def test_a_share_of_memory_that_a_user_has_set_stays(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(gpus.MEMORY, "0.2")
     assert gpus.shared(["0"], 2) == [{gpus.VISIBLE: "0"}] * 2
+
+
+def test_mps_runs_where_its_process_lives(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CUDA_MPS_PIPE_DIRECTORY", str(tmp_path))
+    number = tmp_path / "nvidia-cuda-mps-control.pid"
+    assert not gpus.side_by_side()
+    number.write_text(f"{os.getpid()}\n")
+    assert gpus.side_by_side()
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+    for text in (str(ended.pid), "", "no number", "9" * 30):
+        number.write_text(text)
+        assert not gpus.side_by_side()

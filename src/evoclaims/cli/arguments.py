@@ -17,8 +17,8 @@ _TIERS = {
 _ON_DEVICES = {"plan", "run", "submit", "mutants", "power", "champion", "look", "across", "bisect", "watch"}
 IN_PROCESSES = {"run", "mutants", "power", "watch"}
 _PROCESSES = (
-    "number of processes that run trials (1: this one, on all devices); auto: one per GPU, or without GPUs as many as "
-    "keep the cores busy"
+    "number of processes that run trials (1: this one, on all devices); auto: one per GPU (two where NVIDIA's MPS "
+    "runs), or without GPUs as many as keep the cores busy"
 )
 
 

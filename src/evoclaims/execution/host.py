@@ -42,8 +42,8 @@ def processes_of(numprocesses: str, option: str = "--numprocesses") -> int:
     """
     if numprocesses != "auto" and (not numprocesses.isdecimal() or int(numprocesses) < 1):
         raise UserError(
-            f"{option} takes a number from 1 up, or auto (one for each GPU; without GPUs as many as the cores "
-            f"are enough for), not {numprocesses!r}."
+            f"{option} takes a number from 1 up, or auto (one for each GPU, two where NVIDIA's MPS runs; without GPUs "
+            f"as many as the cores are enough for), not {numprocesses!r}."
         )
     return AUTO if numprocesses == "auto" else int(numprocesses)
 
@@ -54,7 +54,10 @@ def host_of(numprocesses: str, device: str, option: str = "--numprocesses") -> H
     Raises:
         UserError: for an invalid number of processes.
     """
-    host = Host(processes_of(numprocesses, option), gpus.gpus(device))
+    processes, found = processes_of(numprocesses, option), gpus.gpus(device)
+    if processes == AUTO and gpus.side_by_side():
+        processes = gpus.TOGETHER * len(found)
+    host = Host(processes, found)
     if host.gpus and not host.alone:
         from evoclaims.trials import devices  # here, since it imports jax: pytest checks an option with this module
 

@@ -43,8 +43,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--claims-processes",
         metavar="N",
         default="1",
-        help="processes that run trials while claims wait for theirs (1: this one, on all devices); auto: one per GPU, "
-        "or without GPUs as many as keep the cores busy",
+        help="processes that run trials while claims wait for theirs (1: this one, on all devices); auto: one per GPU "
+        "(two where NVIDIA's MPS runs), or without GPUs as many as keep the cores busy",
     )
     group.addoption("--claims-device", metavar="DEVICE", default="auto", help="auto (default), cpu or gpu")
     group.addoption(

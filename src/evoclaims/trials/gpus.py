@@ -20,6 +20,9 @@ MEMORY: Final = "XLA_PYTHON_CLIENT_MEM_FRACTION"
 SHARED_MEMORY: Final = 0.9
 """What several processes on one GPU take of its memory together."""
 
+TOGETHER: Final = 2
+"""Processes that use a GPU well where NVIDIA's MPS runs. Without MPS they take turns, and two are slower than one."""
+
 _NODES: Final = Path("/dev")
 
 
@@ -38,6 +41,18 @@ def gpus(device: str) -> tuple[str, ...]:
         return tuple(name.strip() for name in named.split(",") if name.strip() not in ("", "-1", "NoDevFiles"))
     nodes = [path for path in _NODES.glob("nvidia*") if re.fullmatch(r"nvidia\d+", path.name)]
     return tuple(map(str, range(len(nodes))))  # CUDA numbers those that it may open from 0
+
+
+def side_by_side() -> bool:
+    """Whether NVIDIA's MPS runs here: the kernels of several processes on one GPU then run at the same time."""
+    folder = Path(os.environ.get("CUDA_MPS_PIPE_DIRECTORY") or "/tmp/nvidia-mps")  # noqa: S108  # MPS's own default
+    try:
+        os.kill(int((folder / "nvidia-cuda-mps-control.pid").read_text()), 0)
+    except PermissionError:
+        return True  # it runs, for another user
+    except (OSError, ValueError, OverflowError):
+        return False
+    return True
 
 
 def shared(found: Sequence[str], processes: int) -> list[dict[str, str]]:
