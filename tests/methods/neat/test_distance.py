@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Any
+
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 import reference
-from genomes import dags, made, read
+from assembler import assemble, kernels_for_gpus
+from block_machine import run
+from genomes import CONNECTIONS, NODES, at, dags, made, read, stacked
 from hypothesis import given, settings
+from hypothesis import strategies as st
 from reference import Node
 
-from evoclaims.methods.neat.homology import distance
+from evoclaims.kernels.emit import group_kernel
+from evoclaims.kernels.emit.gpu_kernel import GpuProgram
+from evoclaims.kernels.genomes.gpu_distance import Comparison
+from evoclaims.methods.neat.homology import STEP, _compared_with, _comparison, distance, distances
 from evoclaims.methods.neat.settings import Species
 from evoclaims.networks.genome import Genome
 
@@ -37,3 +47,43 @@ def test_the_distance_of_two_small_genomes_is_the_one_worked_out_by_hand() -> No
     nodes = (1.0 * 1 + 0.4 * (1.0 + 2.0 + 1.0)) / 5
     connections = (1.0 * 3 + 0.4 * 2.0) / 3
     np.testing.assert_allclose(_distance(one, other), nodes + connections, rtol=1e-6)
+
+
+GENOMES, CENTRES = 4, 3
+COMPARISON = Comparison(2.5, 0.7, GENOMES, NODES, CONNECTIONS, STEP)
+KERNEL = _comparison(COMPARISON, CENTRES)
+_distances = jax.jit(lambda *given: distances(Species(disjoint=2.5, difference=0.7), *given))
+
+
+def _by_a_gpus_threads(population: Genome, centres: Genome, count: Any) -> Any:
+    """Return the distances that the kernel for GPUs finds, run by threads of the processor."""
+
+    def call(groups: int, rows: int, own: list[bool], operands: list[Any], shapes: Any) -> Any:
+        text = group_kernel.gpu_text(KERNEL.write, KERNEL.sizes, groups, rows, own)
+        return run(text, GpuProgram("", KERNEL.name), groups * rows, operands, shapes)
+
+    given = [leaf[None] for leaf in (*_compared_with(COMPARISON, population, centres), jnp.asarray(count))]
+    (made,) = KERNEL._call([*given, jnp.arange(CENTRES * GENOMES, dtype=jnp.int32)], call)
+    return made.reshape(CENTRES, GENOMES)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.lists(dags(activations=3), min_size=GENOMES, max_size=GENOMES), st.integers(0, CENTRES))
+def test_all_distances_at_once_are_those_of_each_pair(genomes: list[Genome], count: int) -> None:
+    """By a processor's kernel, a GPU's threads, and the function in jax; infinite to centres that do not count."""
+    population, centres = stacked(genomes), stacked(genomes[1:])
+    wanted = np.full((CENTRES, GENOMES), np.inf)
+    for place in range(count):
+        wanted[place] = [_weighted(one, genomes[1 + place]) for one in genomes]
+    given_ = *_compared_with(COMPARISON, population, centres), jnp.int32(count)
+    in_jax = [KERNEL.function(*given_, jnp.int32(pair))[0] for pair in (0, 5, 11)]
+    np.testing.assert_allclose(in_jax, wanted.ravel()[[0, 5, 11]], rtol=1e-5, atol=1e-6)
+    for made_ in (_distances(population, centres, jnp.int32(count)), _by_a_gpus_threads(population, centres, count)):
+        np.testing.assert_allclose(made_, wanted, rtol=1e-5, atol=1e-6)
+
+
+def test_trials_on_a_gpu_share_one_kernel_and_no_genome_is_copied_for_each_centre(tmp_path: Path) -> None:
+    population = stacked([stacked([made([0, 1, 2], {(0, 2): 1.0})] * GENOMES)] * 2)
+    (ptx,) = kernels_for_gpus(jax.vmap(_distances), population, at(population, np.s_[:, :CENTRES]), np.int32([1, 2]))
+    assert ".entry the_distances_of_genomes(" in ptx
+    assemble(ptx, tmp_path)

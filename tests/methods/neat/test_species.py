@@ -7,6 +7,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 import reference
 from genomes import at, made, read, read_all, same, stacked
 from history import History
@@ -20,7 +21,22 @@ from evoclaims.networks.genome import Genome
 
 POINTS, MOST = 12, 4
 SETTINGS = Species(most=MOST)
-_speciate = jax.jit(lambda species, population, generation: speciate(SETTINGS, species, population, generation))
+
+
+def _speciating(on_gpu: bool) -> Any:
+    """Return the compiled function, as processors or as GPUs group a population."""
+
+    def run(species: SpeciesState, population: Genome, generation: Any) -> SpeciesState:
+        with pytest.MonkeyPatch.context() as patch:
+            if on_gpu:
+                patch.setattr("evoclaims.methods.neat.species.by_platform", lambda _, on_gpu: on_gpu)
+            return speciate(SETTINGS, species, population, generation)
+
+    return jax.jit(run)
+
+
+WAYS = {name: _speciating(name == "GPUs") for name in ("processors", "GPUs")}
+each_way = pytest.mark.parametrize("way", WAYS)
 
 
 def test_sizes_add_up_and_every_genome_belongs_to_a_species_that_is_alive(history: History) -> None:
@@ -86,9 +102,9 @@ def _line(centres: list[float], points: list[float]) -> tuple[Genome, SpeciesSta
     )
 
 
-def _divided(centres: list[float], points: list[float]) -> SpeciesState:
+def _divided(way: str, centres: list[float], points: list[float]) -> SpeciesState:
     population, species = _line(centres, points)
-    divided: SpeciesState = _speciate(species, population, jnp.asarray(7, jnp.int32))
+    divided: SpeciesState = WAYS[way](species, population, jnp.asarray(7, jnp.int32))
     return divided
 
 
@@ -100,10 +116,13 @@ def _places(species: SpeciesState) -> list[float]:
 places = st.integers(-40, 40).map(float)
 
 
+@each_way
 @settings(max_examples=80, deadline=None)
 @given(st.lists(places, max_size=MOST, min_size=1), st.lists(places, min_size=POINTS, max_size=POINTS))
-def test_points_on_a_line_are_divided_as_the_reference_divides_them(centres: list[float], points: list[float]) -> None:
-    species = _divided(centres, points)
+def test_points_on_a_line_are_divided_as_the_reference_divides_them(
+    way: str, centres: list[float], points: list[float]
+) -> None:
+    species = _divided(way, centres, points)
     genes = [read(_point(x)) for x in points]
     member_of, chosen = reference.speciate([read(_point(x)) for x in centres], genes, MOST, 2.0)
     assert np.asarray(species.member_of).tolist() == member_of
@@ -114,13 +133,14 @@ def test_points_on_a_line_are_divided_as_the_reference_divides_them(centres: lis
     assert np.asarray(species.improved_at).tolist() == [*range(len(centres)), *[7] * new]
 
 
-def test_populations_side_by_side_are_divided_as_one_by_one() -> None:
+@each_way
+def test_populations_side_by_side_are_divided_as_one_by_one(way: str) -> None:
     """The number of species differs, so that loops end at different times."""
     lines: list[Any] = [([0.0], [0.0] * POINTS), ([0.0, 20.0], [5.0 * i for i in range(POINTS)])]
     lines.append(([1.0, 2.0, 3.0], [1.0 + i for i in range(POINTS)]))
     populations, states = zip(*(_line(*line) for line in lines), strict=True)
-    together = jax.jit(jax.vmap(_speciate, in_axes=(0, 0, None)))(
+    together = jax.jit(jax.vmap(WAYS[way], in_axes=(0, 0, None)))(
         stacked(states), stacked(populations), jnp.asarray(7, jnp.int32)
     )
     for i, line in enumerate(lines):
-        assert same(at(together, i), _divided(*line))
+        assert same(at(together, i), _divided(way, *line))

@@ -45,7 +45,7 @@ class _Table:
             def is_it() -> str:
                 return page.put(f"icmp eq i32 {load(page, self.numbers, place)}, {number}")
 
-            return when(page, _is_place(page, place), "i1", is_it, "true")
+            return when(page, is_place(page, place), "i1", is_it, "true")
 
         return walk(page, load(page, self._head(number)), ends, lambda place: load(page, self.following, place))
 
@@ -110,9 +110,9 @@ def write_search(
 
         def find_connection(place: str) -> list[str]:
             source, target = (load(page, slots, load(page, ends, place)) for ends in (own_sources, own_targets))
-            nodes_there = _is_place(page, page.put(f"or i32 {source}, {target}"))
+            nodes_there = is_place(page, page.put(f"or i32 {source}, {target}"))
             at_other = when(page, nodes_there, "i32", lambda: by_link.find(link(source, target)), "-1")
-            there = _is_place(page, at_other)
+            there = is_place(page, at_other)
             store(page, when(page, there, "i32", lambda: load(page, weights, at_other), NAN), found_weights, place)
             return []
 
@@ -152,39 +152,50 @@ def write_look_up(
     def search(row: str) -> list[str]:
         link = load(page, wanted[0], row)
         is_searched = page.put(f"icmp ne i32 {link}, {none}")
-        end = page.put(f"select i1 {is_searched}, i32 {count}, i32 0")
-
-        def here(place: str) -> list[str]:
-            """Return which of the next numbers it is."""
-            return [page.put(f"icmp eq i32 {each}, {link}") for each in [load(page, links, at) for at in next_(place)]]
-
-        def next_(place: str) -> list[str]:
-            return [place, *(page.put(f"add i32 {place}, {more}") for more in range(1, step))]
-
-        def any_here(place: str) -> str:
-            found, *others = here(place)
-            for each in others:
-                found = page.put(f"or i1 {found}, {each}")
-            return found
-
-        def ends(place: str) -> str:
-            inside = page.put(f"icmp slt i32 {place}, {end}")
-            return when(page, inside, "i1", lambda: any_here(place), "true")
-
-        def weight(place: str) -> str:
-            at_other = place
-            for more, is_it in list(enumerate(here(place)))[1:]:
-                later = page.put(f"add i32 {place}, {more}")
-                at_other = page.put(f"select i1 {is_it}, i32 {later}, i32 {at_other}")
-            return load(page, weights, at_other)
-
-        place = walk(page, "0", ends, lambda place: page.put(f"add i32 {place}, {step}"))
-        found = page.put(f"icmp slt i32 {place}, {end}")
-        store(page, when(page, found, "i32", lambda: weight(place), NAN), results[0], row)
+        place = find(page, links, link, page.put(f"select i1 {is_searched}, i32 {count}, i32 0"), step)
+        store(page, when(page, is_place(page, place), "i32", lambda: load(page, weights, place), NAN), results[0], row)
         return []
 
     repeat(page, "0", rows.count, [], search)
 
 
-def _is_place(page: Instructions, number: str) -> str:
+def find(page: Instructions, numbers: str, number: str, end: str, step: int) -> str:
+    """Write a search among the first numbers of a list; return the place, or -1.
+
+    Args:
+        page: where to.
+        numbers: address of the list.
+        number: is searched for.
+        end: how many numbers of the list count; those behind, up to a multiple of `step`, must be others.
+        step: numbers that are compared at a time.
+    """
+
+    def here(place: str) -> list[str]:
+        """Return which of the next numbers it is."""
+        places = [place, *(page.put(f"add i32 {place}, {more}") for more in range(1, step))]
+        return [page.put(f"icmp eq i32 {each}, {number}") for each in [load(page, numbers, at) for at in places]]
+
+    def any_here(place: str) -> str:
+        found, *others = here(place)
+        for each in others:
+            found = page.put(f"or i1 {found}, {each}")
+        return found
+
+    def ends(place: str) -> str:
+        inside = page.put(f"icmp slt i32 {place}, {end}")
+        return when(page, inside, "i1", lambda: any_here(place), "true")
+
+    def exact(place: str) -> str:
+        found = place
+        for more, is_it in list(enumerate(here(place)))[1:]:
+            later = page.put(f"add i32 {place}, {more}")
+            found = page.put(f"select i1 {is_it}, i32 {later}, i32 {found}")
+        return found
+
+    place = walk(page, "0", ends, lambda place: page.put(f"add i32 {place}, {step}"))
+    return when(page, page.put(f"icmp slt i32 {place}, {end}"), "i32", lambda: exact(place), "-1")
+
+
+def is_place(page: Instructions, number: str) -> str:
+    """Return whether a number is a place, not -1."""
     return page.put(f"icmp sge i32 {number}, 0")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, partial
-from typing import Final
+from typing import Any, Final
 
 import jax
 import jax.numpy as jnp
@@ -14,6 +14,7 @@ from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 from evoclaims.core.keys import streams
 from evoclaims.core.pytree import pytree
 from evoclaims.kernels import GroupKernel, one_kernel
+from evoclaims.kernels.genomes.gpu_distance import Comparison
 from evoclaims.kernels.genomes.homology import write_look_up, write_search
 from evoclaims.methods.neat.settings import Species
 from evoclaims.networks.genome import Connections, Genome, Nodes
@@ -113,11 +114,18 @@ def _by_matrix(
     other: Genome, source: Int[Array, " connections"], target: Int[Array, " connections"]
 ) -> Float[Array, " connections"]:
     """Look weights up in the matrix of all pairs of slots."""
-    size, genes = other.nodes.key.shape[0], other.connections
-    place = jnp.where(other.has_connection, genes.target, size)
-    matrix = jnp.full((size, size), jnp.nan).at[place, genes.source].set(genes.weight, mode="drop")
-    weights: Float[Array, " connections"] = matrix[target, source]
+    weights: Float[Array, " connections"] = _matrix(other)[target, source]
     return weights
+
+
+def _matrix(genome: Genome) -> Float[Array, "nodes nodes"]:
+    """Return the weights of a genome's connections by slots, [target, source]; NaN where there is none."""
+    size, genes = genome.nodes.key.shape[0], genome.connections
+    place = jnp.where(genome.has_connection, genes.target, size)
+    matrix: Float[Array, "nodes nodes"] = (
+        jnp.full((size, size), jnp.nan).at[place, genes.source].set(genes.weight, mode="drop")
+    )
+    return matrix
 
 
 def _by_comparison(
@@ -197,3 +205,67 @@ def distance(settings: Species, genome: Genome, other: Genome) -> Float[Array, "
     return part(found.has_node, node_difference, genome.node_count, other.node_count) + part(
         found.has_connection, weight_difference, genome.connection_count, other.connection_count
     )
+
+
+def distances(
+    settings: Species, population: Genome, centres: Genome, count: Int[Array, ""]
+) -> Float[Array, "places population"]:
+    """Return each genome's distance to each of the first `count` centres, leaves [places, …]; inf to the others.
+
+    For GPUs: there all are compared at once. Sums are in another order than those of `distance`.
+    """
+    (size, nodes), connections = population.nodes.key.shape, population.connections.weight.shape[1]
+    places = centres.node_count.shape[0]
+    comparison = Comparison(settings.disjoint, settings.difference, size, nodes, connections, STEP)
+    kernel, given = _comparison(comparison, places), [*_compared_with(comparison, population, centres), count]
+    pairs = jnp.arange(places * size, dtype=jnp.int32)
+    (made,) = jax.vmap(lambda pair: kernel(*given, pair))(pairs)
+    distances: Float[Array, "places population"] = made.reshape(places, size)
+    return distances
+
+
+def _compared_with(of: Comparison, population: Genome, centres: Genome) -> list[Array]:
+    """Return what the kernel is given of both."""
+    genes = [jnp.moveaxis(leaf, 0, -1) for leaf in jax.tree.leaves(population)]
+    keys = jnp.pad(centres.nodes.key, ((0, 0), (0, of.keys - of.nodes)), constant_values=VACANT)
+    attributes = centres.nodes.bias, centres.nodes.response, centres.nodes.activation
+    matrices = jax.vmap(_matrix)(centres)
+    return [*genes, keys, *attributes, matrices, centres.node_count, centres.connection_count]
+
+
+@cache
+def _comparison(of: Comparison, places: int) -> GroupKernel:
+    """Return the kernel that compares genomes with centres: a row is the number of a pair, centre by centre."""
+
+    def shaped(dtype: Any, *shape: int) -> jax.ShapeDtypeStruct:
+        return jax.ShapeDtypeStruct(shape, dtype)
+
+    whole, numbers = partial(shaped, jnp.int32), partial(shaped, jnp.float32)
+    nodes, connections, size = of.nodes, of.connections, of.population
+    genes = whole(nodes, size), numbers(nodes, size), numbers(nodes, size), whole(nodes, size)
+    links = whole(connections, size), whole(connections, size), numbers(connections, size)
+    attributes = numbers(places, nodes), numbers(places, nodes), whole(places, nodes)
+    centres = whole(places, of.keys), *attributes, numbers(places, nodes, nodes), whole(places), whole(places)
+    return GroupKernel(
+        name="The distances of genomes",
+        function=partial(_compared, of),
+        groups=(*genes, *links, whole(size), whole(size), *centres, whole()),
+        rows=(whole(),),
+        outputs=(numbers(),),
+        write=of.write,
+        one_lane=True,
+    )
+
+
+def _compared(of: Comparison, *leaves: Array) -> list[Array]:
+    """Return the distance that the kernel finds."""
+    turned, (key, *attributes, matrix, nodes, connections, count, pair) = leaves[:9], leaves[9:]
+    place, number = pair // of.population, pair % of.population
+    own = [leaf[..., number] for leaf in turned]
+    genome = Genome(Nodes(*own[:4]), Connections(*own[4:7]), *own[7:])
+    target, source = jnp.nonzero(~jnp.isnan(matrix[place]), size=of.connections, fill_value=0)
+    genes = Connections(source.astype(jnp.int32), target.astype(jnp.int32), matrix[place, target, source])
+    nodes_of = Nodes(key[place, : of.nodes], *(leaf[place] for leaf in attributes))
+    centre = Genome(nodes_of, genes, nodes[place], connections[place])
+    apart = distance(Species(disjoint=of.disjoint, difference=of.difference), genome, centre)
+    return [jnp.where(place < count, apart, jnp.inf)]

@@ -5,15 +5,17 @@ TensorNEAT's variant: a species has a centre; a genome joins the nearest centre 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
 from evoclaims.core.pytree import pytree
-from evoclaims.kernels import take_rows
-from evoclaims.methods.neat.homology import distance
+from evoclaims.kernels import by_platform, take_rows
+from evoclaims.methods.neat.homology import distance, distances
 from evoclaims.methods.neat.settings import Species
 from evoclaims.networks.genome import Genome
 
@@ -77,42 +79,8 @@ def speciate(settings: Species, species: SpeciesState, population: Genome, gener
     within the threshold. Then, one by one, the first genome without a species founds one, while there is room. The
     remaining genomes join the last species.
     """
-    everyone = jnp.arange(population.node_count.shape[0], dtype=jnp.int32)
-
-    def to_all(centre: Genome) -> Array:
-        result: Array = jax.vmap(lambda genome: distance(settings, genome, centre))(population)
-        return result
-
-    def recentre(place: Array, grouping: _Grouping) -> _Grouping:
-        # Only genomes that are no centre yet, so that two species never share one.
-        distances = to_all(take_rows(species.centres, place))
-        chosen = jnp.argmin(jnp.where(grouping.member_of == NONE, distances, jnp.inf)).astype(jnp.int32)
-        return _join(grouping, place, chosen)
-
-    def gather(place: Array, grouping: _Grouping) -> _Grouping:
-        distances = to_all(take_rows(population, grouping.centre_of[place]))
-        return _attract(settings, grouping, place, distances)
-
-    def found(grouping: _Grouping) -> _Grouping:
-        # The founder also draws nearer genomes from older species, as if its species had been there all along.
-        founder = jnp.argmax(grouping.member_of == NONE).astype(jnp.int32)
-        founded = _join(grouping, grouping.count, founder)
-        distances = to_all(take_rows(population, founder))
-        return replace(_attract(settings, founded, grouping.count, distances), count=grouping.count + 1)
-
-    def unfinished(grouping: _Grouping) -> Bool[Array, ""]:
-        return jnp.any(grouping.member_of == NONE) & (grouping.count < settings.most)
-
-    grouping = _Grouping(
-        count=species.count,
-        centre_of=jnp.zeros((settings.most,), jnp.int32),
-        member_of=jnp.full(everyone.shape, NONE, jnp.int32),
-        nearest=jnp.full(everyone.shape, jnp.inf),
-    )
-    # All centres are chosen before any genome joins: one that has joined could no longer become a centre.
-    grouping = jax.lax.fori_loop(0, species.count, recentre, grouping)
-    grouping = jax.lax.fori_loop(0, species.count, gather, grouping)
-    grouping = jax.lax.while_loop(unfinished, found, grouping)
+    group = by_platform(partial(_grouped_in_turn, settings), partial(_grouped_at_once, settings))
+    grouping: _Grouping = group(species.centres, species.count, population)
     member_of = jnp.where(grouping.member_of == NONE, settings.most - 1, grouping.member_of)
     places = jnp.arange(settings.most)
     alive, new = places < grouping.count, places >= species.count
@@ -124,6 +92,81 @@ def speciate(settings: Species, species: SpeciesState, population: Genome, gener
         size=jnp.where(alive, jnp.sum(member_of[None, :] == places[:, None], axis=1, dtype=jnp.int32), 0),
         member_of=member_of,
     )
+
+
+def _grouped_in_turn(settings: Species, centres: Genome, count: Int[Array, ""], population: Genome) -> _Grouping:
+    """Group a population, one species after the other."""
+
+    def to_all(centre: Genome) -> Array:
+        result: Array = jax.vmap(lambda genome: distance(settings, genome, centre))(population)
+        return result
+
+    def recentre(place: Array, grouping: _Grouping) -> _Grouping:
+        # Only genomes that are no centre yet, so that two species never share one.
+        distances = to_all(take_rows(centres, place))
+        chosen = jnp.argmin(jnp.where(grouping.member_of == NONE, distances, jnp.inf)).astype(jnp.int32)
+        return _join(grouping, place, chosen)
+
+    def gather(place: Array, grouping: _Grouping) -> _Grouping:
+        distances = to_all(take_rows(population, grouping.centre_of[place]))
+        return _attract(settings, grouping, place, distances)
+
+    size = population.node_count.shape
+    grouping = _Grouping(
+        count=count,
+        centre_of=jnp.zeros((settings.most,), jnp.int32),
+        member_of=jnp.full(size, NONE, jnp.int32),
+        nearest=jnp.full(size, jnp.inf),
+    )
+    # All centres are chosen before any genome joins: one that has joined could no longer become a centre.
+    grouping = jax.lax.fori_loop(0, count, recentre, grouping)
+    grouping = jax.lax.fori_loop(0, count, gather, grouping)
+    return _with_new_species(settings, population, grouping, to_all)
+
+
+def _grouped_at_once(settings: Species, centres: Genome, count: Int[Array, ""], population: Genome) -> _Grouping:
+    """Return the same up to rounding, for GPUs, which wait for every number of rounds that they have computed."""
+
+    def to_founder(founder: Genome) -> Array:
+        alone = jax.tree.map(lambda leaf: leaf[None], founder)
+        return distances(settings, population, alone, jnp.ones((), jnp.int32))[0]
+
+    def recentre(place: Array, centre_of: Array) -> Array:
+        is_centre = jnp.any(centre_of[:, None] == everyone[None, :], axis=0)
+        chosen = jnp.argmin(jnp.where(is_centre, jnp.inf, to_old[place])).astype(jnp.int32)
+        return jnp.where((places == place) & (place < count), chosen, centre_of)
+
+    everyone, places = jnp.arange(population.node_count.shape[0]), jnp.arange(settings.most, dtype=jnp.int32)
+    to_old = distances(settings, population, centres, count)
+    chosen = jax.lax.fori_loop(0, settings.most, recentre, jnp.full((settings.most,), NONE, jnp.int32))
+    centre_of = jnp.where(chosen == NONE, 0, chosen)
+    to_new = distances(settings, population, take_rows(population, centre_of), count)
+    is_centre = chosen[:, None] == everyone[None, :]
+    # A centre stays in its own species, even where another one's is its equal.
+    within = jnp.where(is_centre, -1.0, jnp.where(to_new < settings.threshold, to_new, jnp.inf))
+    nearest = jnp.min(within, axis=0)
+    member_of = jnp.where(nearest < jnp.inf, jnp.argmin(within, axis=0).astype(jnp.int32), NONE)
+    grouping = _Grouping(count, centre_of, member_of, jnp.maximum(nearest, 0.0))
+    return _with_new_species(settings, population, grouping, to_founder)
+
+
+def _with_new_species(
+    settings: Species, population: Genome, grouping: _Grouping, to_all: Callable[[Genome], Array]
+) -> _Grouping:
+    """Found species one by one, while there is room; `to_all` returns every genome's distance to a founder."""
+
+    def found(grouping: _Grouping) -> _Grouping:
+        # The founder also draws nearer genomes from older species, as if its species had been there all along.
+        founder = jnp.argmax(grouping.member_of == NONE).astype(jnp.int32)
+        founded = _join(grouping, grouping.count, founder)
+        distances = to_all(take_rows(population, founder))
+        return replace(_attract(settings, founded, grouping.count, distances), count=grouping.count + 1)
+
+    def unfinished(grouping: _Grouping) -> Bool[Array, ""]:
+        return jnp.any(grouping.member_of == NONE) & (grouping.count < settings.most)
+
+    made: _Grouping = jax.lax.while_loop(unfinished, found, grouping)
+    return made
 
 
 def _join(grouping: _Grouping, place: Int[Array, ""], chosen: Int[Array, ""]) -> _Grouping:
