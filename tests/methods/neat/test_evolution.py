@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import reference
 from genomes import at, read_all, same
+from usual_fusions import USUAL_FUSIONS
 
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.neat import capacity
@@ -55,7 +56,7 @@ def _bench(settings: Settings) -> Bench:
     with jax.numpy_dtype_promotion("strict"), jax.numpy_rank_promotion("raise"), jax.debug_key_reuse(True):
         state = jax.jit(lambda key: method.init(key, TASK))(jax.random.key(2))
         level = jnp.zeros((), jnp.int32)
-        step = jax.jit(generation).lower(keys[0], level, state).compile()
+        step = jax.jit(generation).lower(keys[0], level, state).compile(USUAL_FUSIONS)
     states, reports = [state], []
     for key in keys:
         state, progress = step(key, level, state)
