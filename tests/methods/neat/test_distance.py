@@ -55,6 +55,14 @@ KERNEL = _comparison(COMPARISON, CENTRES)
 _distances = jax.jit(lambda *given: distances(Species(disjoint=2.5, difference=0.7), *given))
 
 
+@jax.jit
+def _without_kernels(*given: Any) -> Any:
+    """Return the distances as GPUs find them that are too old for kernels."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("evoclaims.kernels.call.calls.gpu_is_new_enough", lambda: False)
+        return distances(Species(disjoint=2.5, difference=0.7), *given)
+
+
 def _by_a_gpus_threads(population: Genome, centres: Genome, count: Any) -> Any:
     """Return the distances that the kernel for GPUs finds, run by threads of the processor."""
 
@@ -78,7 +86,8 @@ def test_all_distances_at_once_are_those_of_each_pair(genomes: list[Genome], cou
     given_ = *_compared_with(COMPARISON, population, centres), jnp.int32(count)
     in_jax = [KERNEL.function(*given_, jnp.int32(pair))[0] for pair in (0, 5, 11)]
     np.testing.assert_allclose(in_jax, wanted.ravel()[[0, 5, 11]], rtol=1e-5, atol=1e-6)
-    for made_ in (_distances(population, centres, jnp.int32(count)), _by_a_gpus_threads(population, centres, count)):
+    ways = _distances, _without_kernels, _by_a_gpus_threads
+    for made_ in [way(population, centres, jnp.int32(count)) for way in ways]:
         np.testing.assert_allclose(made_, wanted, rtol=1e-5, atol=1e-6)
 
 

@@ -118,11 +118,15 @@ def _lowered(choose: Callable[[Callee], Callable[..., list[Array]]]) -> Any:
     return rule
 
 
-def _for_gpu(kernel: Callee) -> Callable[..., list[Array]]:
-    """Return the kernel's call; GPUs that are too old get the function itself. A program may be lowered without one."""
+def gpu_is_new_enough() -> bool:
+    """Whether the GPU runs kernels. A program may be lowered without one."""
     capability = getattr(jax.devices()[0], "compute_capability", None)
-    is_new_enough = capability is None or float(capability) >= gpu_kernel.CAPABILITY
-    return kernel.on_gpu if is_new_enough else kernel.as_it_is
+    return capability is None or float(capability) >= gpu_kernel.CAPABILITY
+
+
+def _for_gpu(kernel: Callee) -> Callable[..., list[Array]]:
+    """Return the kernel's call; GPUs that are too old get the function itself."""
+    return kernel.on_gpu if gpu_is_new_enough() else kernel.as_it_is
 
 
 CALL.def_impl(_alone)

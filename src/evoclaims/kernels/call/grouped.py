@@ -63,6 +63,11 @@ class GroupKernel:
         return True
 
     @property
+    def runs_on_gpus(self) -> bool:
+        """Whether the GPU of this machine runs it, not `function`."""
+        return self.for_gpus and self.supported and calls.gpu_is_new_enough()
+
+    @property
     def sizes(self) -> Sizes:
         """The numbers in each array."""
         groups, rows, results = (

@@ -218,6 +218,9 @@ def distances(
     places = centres.node_count.shape[0]
     comparison = Comparison(settings.disjoint, settings.difference, size, nodes, connections, STEP)
     kernel, given = _comparison(comparison, places), [*_compared_with(comparison, population, centres), count]
+    if not kernel.runs_on_gpus:  # `_compared` would copy a matrix for each pair
+        made = jax.lax.map(lambda centre: jax.vmap(lambda own: distance(settings, own, centre))(population), centres)
+        return jnp.where(jnp.arange(places)[:, None] < count, made, jnp.inf)
     pairs = jnp.arange(places * size, dtype=jnp.int32)
     (made,) = jax.vmap(lambda pair: kernel(*given, pair))(pairs)
     distances: Float[Array, "places population"] = made.reshape(places, size)
