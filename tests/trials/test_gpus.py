@@ -84,3 +84,6 @@ def test_mps_runs_where_its_process_lives(tmp_path: Path, monkeypatch: pytest.Mo
     for text in (str(ended.pid), "", "no number", "9" * 30):
         number.write_text(text)
         assert not gpus.side_by_side()
+    number.unlink()
+    os.mkfifo(number)  # which nobody writes into
+    assert not gpus.side_by_side()

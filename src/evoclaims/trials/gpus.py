@@ -13,6 +13,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
+from evoclaims.core.files import read_file
+
 VISIBLE: Final = "CUDA_VISIBLE_DEVICES"
 MEMORY: Final = "XLA_PYTHON_CLIENT_MEM_FRACTION"
 """The share of a GPU's memory that jax takes when it starts: three quarters, unless it is configured otherwise."""
@@ -47,7 +49,7 @@ def side_by_side() -> bool:
     """Whether NVIDIA's MPS runs here: the kernels of several processes on one GPU then run at the same time."""
     folder = Path(os.environ.get("CUDA_MPS_PIPE_DIRECTORY") or "/tmp/nvidia-mps")  # noqa: S108  # MPS's own default
     try:
-        os.kill(int((folder / "nvidia-cuda-mps-control.pid").read_text()), 0)
+        os.kill(int(read_file(folder / "nvidia-cuda-mps-control.pid")), 0)
     except PermissionError:
         return True  # it runs, for another user
     except (OSError, ValueError, OverflowError):
