@@ -237,6 +237,22 @@ def test_conditions_of_two_shares_have_several_gpus_and_there_are_always_enough(
             assert number == len(seat.then) == min(10, int(took[int(seat.first.method)] / share), count) >= 2
 
 
+def test_two_processes_share_a_gpu_under_mps_where_batches_are_more_than_gpus() -> None:
+    equal = [_batch(str(i), 10.0) for i in range(9)]
+    host = Host(AUTO, ("0", "1"), together=2)
+    for batches, used in ((1, "0,1"), (2, "0 1"), (3, "0 1 0"), (4, "0 1 0 1"), (9, "0 1 0 1")):
+        seats = seats_of(host, equal[:batches])
+        assert [seat.environment[gpus.VISIBLE] for seat in seats] == used.split()
+        crowds = Counter(used.split())
+        halves = [crowds[seat.environment[gpus.VISIBLE]] == 2 for seat in seats]
+        assert [gpus.MEMORY in seat.environment for seat in seats] == halves
+    (alone,) = seats_of(Host(AUTO, ("0",), together=2), equal[:1])
+    assert alone.environment == {gpus.VISIBLE: "0"}
+    long = [_batch("long", 1000.0), *(_batch(str(i), 1.0) for i in range(9))]
+    three = seats_of(Host(AUTO, ("0", "1", "2"), together=2), long)
+    assert [seat.environment[gpus.VISIBLE] for seat in three] == ["0,1", "2", "2"]
+
+
 def test_processes_are_as_many_as_keep_the_cores_busy() -> None:
     running = [_batch(str(i), 1000.0, 0.0, Layout.ALONE) for i in range(50)]  # ten trials each
     compiling = [_batch(str(i), 0.0, 10.0, Layout.ALONE) for i in range(50)]
@@ -274,12 +290,12 @@ def test_a_command_whose_processes_have_gpus_keeps_off_these_itself(
     text: str, found: int, mps: bool, alone: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     off: list[bool] = []
-    monkeypatch.setattr(gpus, "side_by_side", lambda: mps)
+    monkeypatch.setattr(gpus, "mps_runs", lambda: mps)
     monkeypatch.setattr(gpus, "gpus", lambda device: tuple(map(str, range(found))))
     monkeypatch.setattr("evoclaims.trials.devices.keep_off_gpus", lambda: off.append(True))
     host = host_of(text, "auto")
     assert host.alone == alone
-    assert host.processes == (2 * found if mps and text == "auto" else AUTO if text == "auto" else int(text))
+    assert host.together == (2 if mps and found else 1)
     assert off == [True] * (found > 0 and not alone)
 
 

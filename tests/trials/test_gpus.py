@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import importlib.metadata
 import os
-import subprocess
-import sys
 from collections import Counter
 from pathlib import Path
 from types import SimpleNamespace
@@ -73,17 +71,25 @@ def test_a_share_of_memory_that_a_user_has_set_stays(monkeypatch: pytest.MonkeyP
     assert gpus.shared(["0"], 2) == [{gpus.VISIBLE: "0"}] * 2
 
 
-def test_mps_runs_where_its_process_lives(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_mps_runs_where_its_process_lives_for_this_user(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CUDA_MPS_PIPE_DIRECTORY", str(tmp_path))
-    number = tmp_path / "nvidia-cuda-mps-control.pid"
-    assert not gpus.side_by_side()
-    number.write_text(f"{os.getpid()}\n")
-    assert gpus.side_by_side()
-    ended = subprocess.Popen([sys.executable, "-c", ""])
-    ended.wait()
-    for text in (str(ended.pid), "", "no number", "9" * 30):
+    monkeypatch.setattr(gpus, "_PROCESSES", tmp_path)
+    number, process = tmp_path / "nvidia-cuda-mps-control.pid", tmp_path / "4711"
+    process.mkdir()
+    (process / "cmdline").write_bytes(b"nvidia-cuda-mps-control\0-d\0")
+    assert not gpus.mps_runs()
+    number.write_text("4711")
+    assert gpus.mps_runs()
+    for text in ("4712", "", "no number", "9" * 5000, "-1"):
         number.write_text(text)
-        assert not gpus.side_by_side()
+        assert not gpus.mps_runs()
+    number.write_text("4711\n")
+    monkeypatch.setattr(os, "getuid", lambda: 1 + os.stat(process).st_uid)
+    assert gpus.mps_runs() == (os.stat(process).st_uid == 0)  # root's serves everybody
+    monkeypatch.undo()
+    monkeypatch.setenv("CUDA_MPS_PIPE_DIRECTORY", str(tmp_path))
+    number.write_text(str(os.getpid()))  # another process has the number now
+    assert not gpus.mps_runs()
     number.unlink()
     os.mkfifo(number)  # which nobody writes into
-    assert not gpus.side_by_side()
+    assert not gpus.mps_runs()

@@ -23,15 +23,17 @@ class Host:
     Attributes:
         processes: how many are asked for; 0 for as many as are useful.
         gpus: the GPUs that they share; empty on processors.
+        together: processes that use a GPU well.
     """
 
     processes: int
     gpus: tuple[str, ...]
+    together: int = 1
 
     @property
     def alone(self) -> bool:
         """Whether this process runs everything, on all devices."""
-        return self.processes == 1 or (self.processes == AUTO and len(self.gpus) == 1)
+        return self.processes == 1 or (self.processes == AUTO and len(self.gpus) * self.together == 1)
 
 
 def processes_of(numprocesses: str, option: str = "--numprocesses") -> int:
@@ -55,9 +57,7 @@ def host_of(numprocesses: str, device: str, option: str = "--numprocesses") -> H
         UserError: for an invalid number of processes.
     """
     processes, found = processes_of(numprocesses, option), gpus.gpus(device)
-    if processes == AUTO and gpus.side_by_side():
-        processes = gpus.TOGETHER * len(found)
-    host = Host(processes, found)
+    host = Host(processes, found, gpus.WITH_MPS if found and gpus.mps_runs() else 1)
     if host.gpus and not host.alone:
         from evoclaims.trials import devices  # here, since it imports jax: pytest checks an option with this module
 

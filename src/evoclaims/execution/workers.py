@@ -330,7 +330,7 @@ def seats_of(host: Host, batches: Sequence[MissingBatch]) -> list[Seat]:
     if not batches:
         return []
     if host.gpus and host.processes == AUTO:
-        return _a_gpu_each(host.gpus, batches)
+        return _a_gpu_each(host.gpus, batches, host.together)
     if host.gpus:
         return [Seat(environment) for environment in gpus.shared(host.gpus, host.processes)]
     processes = host.processes or useful_processes(batches, devices.usable_cores())
@@ -344,11 +344,12 @@ def useful_processes(batches: Sequence[MissingBatch], cores: int) -> int:
     return max(round(cores * in_parallel / alone), 1)
 
 
-def _a_gpu_each(found: Sequence[str], batches: Sequence[MissingBatch]) -> list[Seat]:
+def _a_gpu_each(found: Sequence[str], batches: Sequence[MissingBatch], together: int) -> list[Seat]:
     """Return a seat for each GPU, save for batches that would take two GPUs' share or more: these have several.
 
     A batch that takes k shares of the whole time has k GPUs, which are single seats when it has ended. So no more GPUs
-    are asked for than there are.
+    are asked for than there are. Where several processes use a GPU well and batches are more than GPUs, a GPU that no
+    batch has to itself has `together` seats.
     """
     share, free, seats = sum(batch.cost.seconds() for batch in batches) / len(found), list(found), []
     for batch in batches:
@@ -357,4 +358,5 @@ def _a_gpu_each(found: Sequence[str], batches: Sequence[MissingBatch]) -> list[S
             continue
         taken, free = free[:wide], free[wide:]
         seats.append(Seat(gpus.only(taken), batch.job, tuple(Seat(gpus.only([one])) for one in taken)))
-    return [*seats, *(Seat(gpus.only([one])) for one in free)]
+    crowd = min(len(batches) - len(seats), len(free) * together)
+    return [*seats, *(map(Seat, gpus.shared(free, max(crowd, len(free)))) if free else ())]

@@ -22,10 +22,12 @@ MEMORY: Final = "XLA_PYTHON_CLIENT_MEM_FRACTION"
 SHARED_MEMORY: Final = 0.9
 """What several processes on one GPU take of its memory together."""
 
-TOGETHER: Final = 2
-"""Processes that use a GPU well where NVIDIA's MPS runs. Without MPS they take turns, and two are slower than one."""
+WITH_MPS: Final = 2
+"""Processes for a GPU where NVIDIA's MPS runs; without it they take turns, and two are slower than one."""
 
 _NODES: Final = Path("/dev")
+_PROCESSES: Final = Path("/proc")
+_DAEMON: Final = "nvidia-cuda-mps-control"
 
 
 def gpus(device: str) -> tuple[str, ...]:
@@ -45,16 +47,14 @@ def gpus(device: str) -> tuple[str, ...]:
     return tuple(map(str, range(len(nodes))))  # CUDA numbers those that it may open from 0
 
 
-def side_by_side() -> bool:
-    """Whether NVIDIA's MPS runs here: the kernels of several processes on one GPU then run at the same time."""
+def mps_runs() -> bool:
+    """Whether NVIDIA's MPS runs here for this user: it lets several processes use a GPU at the same time."""
     folder = Path(os.environ.get("CUDA_MPS_PIPE_DIRECTORY") or "/tmp/nvidia-mps")  # noqa: S108  # MPS's own default
     try:
-        os.kill(int(read_file(folder / "nvidia-cuda-mps-control.pid")), 0)
-    except PermissionError:
-        return True  # it runs, for another user
-    except (OSError, ValueError, OverflowError):
+        process = _PROCESSES / str(int(read_file(folder / f"{_DAEMON}.pid")))
+        return process.stat().st_uid in (0, os.getuid()) and _DAEMON in read_file(process / "cmdline").decode()
+    except (OSError, ValueError):  # nobody has that number now, or the file is nonsense
         return False
-    return True
 
 
 def shared(found: Sequence[str], processes: int) -> list[dict[str, str]]:
