@@ -20,7 +20,7 @@ from reference import Node
 from evoclaims.kernels.emit import group_kernel
 from evoclaims.kernels.emit.gpu_kernel import GpuProgram
 from evoclaims.kernels.genomes.gpu_distance import Comparison
-from evoclaims.methods.neat.homology import STEP, _compared_with, _comparison, distance, distances
+from evoclaims.methods.neat.homology import STEP, _compared_with, _comparison, distance, distances, turned
 from evoclaims.methods.neat.settings import Species
 from evoclaims.networks.genome import Genome
 
@@ -52,15 +52,14 @@ def test_the_distance_of_two_small_genomes_is_the_one_worked_out_by_hand() -> No
 GENOMES, CENTRES = 4, 3
 COMPARISON = Comparison(2.5, 0.7, GENOMES, NODES, CONNECTIONS, STEP)
 KERNEL = _comparison(COMPARISON, CENTRES)
-_distances = jax.jit(lambda *given: distances(Species(disjoint=2.5, difference=0.7), *given))
+_distances = jax.jit(
+    lambda population, *given: distances(Species(disjoint=2.5, difference=0.7), turned(population), *given)
+)
 
 
-@jax.jit
-def _without_kernels(*given: Any) -> Any:
-    """Return the distances as GPUs find them that are too old for kernels."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("evoclaims.kernels.call.calls.gpu_is_new_enough", lambda: False)
-        return distances(Species(disjoint=2.5, difference=0.7), *given)
+def _given(population: Genome, centres: Genome, count: Any) -> list[Any]:
+    """Return the kernel's arguments but the pair's number."""
+    return [*jax.tree.leaves(turned(population)), *_compared_with(COMPARISON, centres), jnp.int32(count)]
 
 
 def _by_a_gpus_threads(population: Genome, centres: Genome, count: Any) -> Any:
@@ -70,7 +69,7 @@ def _by_a_gpus_threads(population: Genome, centres: Genome, count: Any) -> Any:
         text = group_kernel.gpu_text(KERNEL.write, KERNEL.sizes, groups, rows, own)
         return run(text, GpuProgram("", KERNEL.name), groups * rows, operands, shapes)
 
-    given = [leaf[None] for leaf in (*_compared_with(COMPARISON, population, centres), jnp.asarray(count))]
+    given = [leaf[None] for leaf in _given(population, centres, count)]
     (made,) = KERNEL._call([*given, jnp.arange(CENTRES * GENOMES, dtype=jnp.int32)], call)
     return made.reshape(CENTRES, GENOMES)
 
@@ -83,10 +82,10 @@ def test_all_distances_at_once_are_those_of_each_pair(genomes: list[Genome], cou
     wanted = np.full((CENTRES, GENOMES), np.inf)
     for place in range(count):
         wanted[place] = [_weighted(one, genomes[1 + place]) for one in genomes]
-    given_ = *_compared_with(COMPARISON, population, centres), jnp.int32(count)
+    given_ = _given(population, centres, count)
     in_jax = [KERNEL.function(*given_, jnp.int32(pair))[0] for pair in (0, 5, 11)]
     np.testing.assert_allclose(in_jax, wanted.ravel()[[0, 5, 11]], rtol=1e-5, atol=1e-6)
-    ways = _distances, _without_kernels, _by_a_gpus_threads
+    ways = _distances, _by_a_gpus_threads
     for made_ in [way(population, centres, jnp.int32(count)) for way in ways]:
         np.testing.assert_allclose(made_, wanted, rtol=1e-5, atol=1e-6)
 

@@ -23,19 +23,24 @@ POINTS, MOST = 12, 4
 SETTINGS = Species(most=MOST)
 
 
-def _speciating(on_gpu: bool) -> Any:
+def _speciating(on_gpu: bool, kernels: bool = True) -> Any:
     """Return the compiled function, as processors or as GPUs group a population."""
 
     def run(species: SpeciesState, population: Genome, generation: Any) -> SpeciesState:
         with pytest.MonkeyPatch.context() as patch:
             if on_gpu:
                 patch.setattr("evoclaims.methods.neat.species.by_platform", lambda _, on_gpu: on_gpu)
+                patch.setattr("evoclaims.methods.neat.species.gpus_run_kernels", lambda: kernels)
             return speciate(SETTINGS, species, population, generation)
 
     return jax.jit(run)
 
 
-WAYS = {name: _speciating(name == "GPUs") for name in ("processors", "GPUs")}
+WAYS = {
+    "processors": _speciating(on_gpu=False),
+    "GPUs": _speciating(on_gpu=True),
+    "GPUs without kernels": _speciating(on_gpu=True, kernels=False),
+}
 each_way = pytest.mark.parametrize("way", WAYS)
 
 

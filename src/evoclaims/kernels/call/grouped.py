@@ -63,11 +63,6 @@ class GroupKernel:
         return True
 
     @property
-    def runs_on_gpus(self) -> bool:
-        """Whether the GPU of this machine runs it, not `function`."""
-        return self.for_gpus and self.supported and calls.gpu_is_new_enough()
-
-    @property
     def sizes(self) -> Sizes:
         """The numbers in each array."""
         groups, rows, results = (
@@ -161,6 +156,15 @@ class GroupKernel:
             shaped = result.reshape(*(batch[i] for i in order), *out.shape)
             results.append(jnp.transpose(shaped, (*back, *range(len(batch), shaped.ndim))))
         return results
+
+
+def gpus_run_kernels() -> bool:
+    """Whether the GPU of this machine runs kernels, not their functions."""
+    try:
+        machine_code.lanes()
+    except Unsupported:
+        return False
+    return calls.gpu_is_new_enough()
 
 
 @cache

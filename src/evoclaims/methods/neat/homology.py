@@ -17,12 +17,12 @@ from evoclaims.kernels import GroupKernel, one_kernel
 from evoclaims.kernels.genomes.gpu_distance import Comparison
 from evoclaims.kernels.genomes.homology import write_look_up, write_search
 from evoclaims.methods.neat.settings import Species
-from evoclaims.networks.genome import Connections, Genome, Nodes
+from evoclaims.networks.genome import EMPTY, Connections, Genome, Nodes
 
 Weights = Callable[[Genome, Array, Array], Array]
 """Returns the weights of a genome's connections between pairs of slots, or NaN; of a slot of -1, anything."""
 STEP: Final = 4
-"""Connections that a GPU's thread compares at a time."""
+"""Numbers that a GPU's thread compares at a time."""
 NOWHERE: Final = -1
 """Is looked for in place of a connection that the other genome cannot have."""
 VACANT: Final = -2
@@ -207,33 +207,35 @@ def distance(settings: Species, genome: Genome, other: Genome) -> Float[Array, "
     )
 
 
+def turned(population: Genome) -> Genome:
+    """Return a population gene by gene, as `distances` takes it: the last axis of each leaf is that of genomes."""
+    by_gene: Genome = jax.tree.map(lambda leaf: jnp.moveaxis(leaf, 0, -1), population)
+    return by_gene
+
+
 def distances(
     settings: Species, population: Genome, centres: Genome, count: Int[Array, ""]
 ) -> Float[Array, "places population"]:
     """Return each genome's distance to each of the first `count` centres, leaves [places, …]; inf to the others.
 
-    For GPUs: there all are compared at once. Sums are in another order than those of `distance`.
+    For GPUs that run kernels: there all are compared at once. Sums are in another order than those of `distance`.
+    The population is `turned`.
     """
-    (size, nodes), connections = population.nodes.key.shape, population.connections.weight.shape[1]
+    (nodes, size), connections = population.nodes.key.shape, population.connections.weight.shape[0]
     places = centres.node_count.shape[0]
     comparison = Comparison(settings.disjoint, settings.difference, size, nodes, connections, STEP)
-    kernel, given = _comparison(comparison, places), [*_compared_with(comparison, population, centres), count]
-    if not kernel.runs_on_gpus:  # `_compared` would copy a matrix for each pair
-        made = jax.lax.map(lambda centre: jax.vmap(lambda own: distance(settings, own, centre))(population), centres)
-        return jnp.where(jnp.arange(places)[:, None] < count, made, jnp.inf)
+    kernel, given = _comparison(comparison, places), _compared_with(comparison, centres)
     pairs = jnp.arange(places * size, dtype=jnp.int32)
-    (made,) = jax.vmap(lambda pair: kernel(*given, pair))(pairs)
+    (made,) = jax.vmap(lambda pair: kernel(*jax.tree.leaves(population), *given, count, pair))(pairs)
     distances: Float[Array, "places population"] = made.reshape(places, size)
     return distances
 
 
-def _compared_with(of: Comparison, population: Genome, centres: Genome) -> list[Array]:
-    """Return what the kernel is given of both."""
-    genes = [jnp.moveaxis(leaf, 0, -1) for leaf in jax.tree.leaves(population)]
-    keys = jnp.pad(centres.nodes.key, ((0, 0), (0, of.keys - of.nodes)), constant_values=VACANT)
+def _compared_with(of: Comparison, centres: Genome) -> list[Array]:
+    """Return what the kernel is given of centres."""
+    keys = jnp.pad(centres.nodes.key, ((0, 0), (0, of.keys - of.nodes)), constant_values=EMPTY)
     attributes = centres.nodes.bias, centres.nodes.response, centres.nodes.activation
-    matrices = jax.vmap(_matrix)(centres)
-    return [*genes, keys, *attributes, matrices, centres.node_count, centres.connection_count]
+    return [keys, *attributes, jax.vmap(_matrix)(centres), centres.node_count, centres.connection_count]
 
 
 @cache
@@ -262,9 +264,9 @@ def _comparison(of: Comparison, places: int) -> GroupKernel:
 
 def _compared(of: Comparison, *leaves: Array) -> list[Array]:
     """Return the distance that the kernel finds."""
-    turned, (key, *attributes, matrix, nodes, connections, count, pair) = leaves[:9], leaves[9:]
+    population, (key, *attributes, matrix, nodes, connections, count, pair) = leaves[:9], leaves[9:]
     place, number = pair // of.population, pair % of.population
-    own = [leaf[..., number] for leaf in turned]
+    own = [leaf[..., number] for leaf in population]
     genome = Genome(Nodes(*own[:4]), Connections(*own[4:7]), *own[7:])
     target, source = jnp.nonzero(~jnp.isnan(matrix[place]), size=of.connections, fill_value=0)
     genes = Connections(source.astype(jnp.int32), target.astype(jnp.int32), matrix[place, target, source])

@@ -14,8 +14,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
 from evoclaims.core.pytree import pytree
-from evoclaims.kernels import by_platform, take_rows
-from evoclaims.methods.neat.homology import distance, distances
+from evoclaims.kernels import by_platform, gpus_run_kernels, take_rows
+from evoclaims.methods.neat.homology import distance, distances, turned
 from evoclaims.methods.neat.settings import Species
 from evoclaims.networks.genome import Genome
 
@@ -79,7 +79,7 @@ def speciate(settings: Species, species: SpeciesState, population: Genome, gener
     within the threshold. Then, one by one, the first genome without a species founds one, while there is room. The
     remaining genomes join the last species.
     """
-    group = by_platform(partial(_grouped_in_turn, settings), partial(_grouped_at_once, settings))
+    group = by_platform(partial(_grouped_in_turn, settings), partial(_grouped_on_gpus, settings))
     grouping: _Grouping = group(species.centres, species.count, population)
     member_of = jnp.where(grouping.member_of == NONE, settings.most - 1, grouping.member_of)
     places = jnp.arange(settings.most)
@@ -124,12 +124,17 @@ def _grouped_in_turn(settings: Species, centres: Genome, count: Int[Array, ""], 
     return _with_new_species(settings, population, grouping, to_all)
 
 
+def _grouped_on_gpus(settings: Species, centres: Genome, count: Int[Array, ""], population: Genome) -> _Grouping:
+    group = _grouped_at_once if gpus_run_kernels() else _grouped_in_turn
+    return group(settings, centres, count, population)
+
+
 def _grouped_at_once(settings: Species, centres: Genome, count: Int[Array, ""], population: Genome) -> _Grouping:
     """Return the same up to rounding, for GPUs, which wait for every number of rounds that they have computed."""
 
     def to_founder(founder: Genome) -> Array:
         alone = jax.tree.map(lambda leaf: leaf[None], founder)
-        return distances(settings, population, alone, jnp.ones((), jnp.int32))[0]
+        return distances(settings, by_gene, alone, jnp.ones((), jnp.int32))[0]
 
     def recentre(place: Array, centre_of: Array) -> Array:
         is_centre = jnp.any(centre_of[:, None] == everyone[None, :], axis=0)
@@ -137,13 +142,15 @@ def _grouped_at_once(settings: Species, centres: Genome, count: Int[Array, ""], 
         return jnp.where((places == place) & (place < count), chosen, centre_of)
 
     everyone, places = jnp.arange(population.node_count.shape[0]), jnp.arange(settings.most, dtype=jnp.int32)
-    to_old = distances(settings, population, centres, count)
+    by_gene = turned(population)  # once, and not for each founder
+    to_old = distances(settings, by_gene, centres, count)
     chosen = jax.lax.fori_loop(0, settings.most, recentre, jnp.full((settings.most,), NONE, jnp.int32))
     centre_of = jnp.where(chosen == NONE, 0, chosen)
-    to_new = distances(settings, population, take_rows(population, centre_of), count)
+    to_new = distances(settings, by_gene, take_rows(population, centre_of), count)
     is_centre = chosen[:, None] == everyone[None, :]
-    # A centre stays in its own species, even where another one's is its equal.
-    within = jnp.where(is_centre, -1.0, jnp.where(to_new < settings.threshold, to_new, jnp.inf))
+    # A centre stays in its own species, even where another one's is its equal; one of several species in the last.
+    own = -1.0 - places[:, None].astype(jnp.float32)
+    within = jnp.where(is_centre, own, jnp.where(to_new < settings.threshold, to_new, jnp.inf))
     nearest = jnp.min(within, axis=0)
     member_of = jnp.where(nearest < jnp.inf, jnp.argmin(within, axis=0).astype(jnp.int32), NONE)
     grouping = _Grouping(count, centre_of, member_of, jnp.maximum(nearest, 0.0))
