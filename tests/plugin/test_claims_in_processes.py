@@ -56,6 +56,15 @@ def test_both_tiers_and_a_variant_run_in_processes(project: Any) -> None:
     assert result.parseoutcomes()["refuted"] == 2
 
 
+def test_a_plan_of_fixtures_begins_no_processes(project: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    begun: list[object] = []
+    monkeypatch.setattr("evoclaims.execution.ahead.Ahead.start", lambda *given: begun.append(given))
+    project.write(a="supported")
+    result = project.run("--claims-processes=2", "--setup-plan", own_store=True)
+    assert result.ret == 0
+    assert not begun
+
+
 def test_a_number_that_is_none_is_refused(project: Any, sentence: Any) -> None:
     project.write(a="supported")
     result = project.run("--claims-processes=0", "--collect-only", own_store=True)

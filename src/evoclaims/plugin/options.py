@@ -213,7 +213,7 @@ def _ahead(config: pytest.Config, reproduction: Reproduction, store: Store, limi
 
     asked, device = config.getoption("claims_processes"), config.getoption("claims_device")
     host = host_of(asked, device, "--claims-processes")
-    if host.alone or config.getoption("claims_stored"):
+    if host.alone or config.getoption("claims_stored") or config.getoption("setupplan", False):
         return None
     if hasattr(config, "workerinput"):
         raise UserError("Workers of pytest-xdist run trials themselves: leave out -n, or --claims-processes.")
