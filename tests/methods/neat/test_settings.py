@@ -58,6 +58,8 @@ IMPOSSIBLE: dict[type, list[dict[str, Any]]] = {
             {"elites": -1},
             {"stagnation": -1},
             {"threshold": 0.0},
+            {"disjoint": -1.0},
+            {"difference": math.nan},
             {"on_level_up": "forget"},
         ),
         *({name: wrong} for name, wrongs in (("survival", (0.0, 1.5)), ("change", (-0.5, 1.5))) for wrong in wrongs),

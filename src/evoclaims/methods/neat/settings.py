@@ -107,6 +107,11 @@ class Species:
                 f"NEAT's species have survival={self.survival}, change={self.change} and threshold={self.threshold}. "
                 "Write a survival above 0 and at most 1, a change from 0 to 1, and a threshold above 0."
             )
+        if not (0 <= self.disjoint < math.inf and 0 <= self.difference < math.inf):
+            raise UserError(
+                f"NEAT's species have disjoint={self.disjoint} and difference={self.difference}. Write finite "
+                "weights of at least 0."
+            )
 
 
 @dataclass(frozen=True)
