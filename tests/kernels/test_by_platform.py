@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import jax
@@ -10,7 +11,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from evoclaims.kernels import gpus_run_kernels
 from evoclaims.kernels.call.by_platform import BY_PLATFORM, by_platform
+from evoclaims.kernels.emit import machine_code
+from evoclaims.kernels.trace.expressions import Unsupported
 
 X = np.random.default_rng(0).normal(size=(3, 4)).astype(np.float32)
 Y = np.random.default_rng(1).normal(size=(3, 4)).astype(np.float32)
@@ -99,3 +103,19 @@ def test_derivatives_are_the_functions_own() -> None:
         return jax.vmap(jax.grad(lambda x, y: jnp.sum(function(x, y)["sine"]), argnums=(0, 1)))(X, Y)
 
     _same(slopes(by_platform(_sine, _never)), slopes(_sine))
+
+
+@pytest.mark.parametrize(("capability", "runs"), [("7.5", False), ("8.0", True), ("10.0", True), (None, True)])
+def test_kernels_run_on_gpus_that_are_new_enough(
+    capability: str | None, runs: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(jax, "devices", lambda: [SimpleNamespace(compute_capability=capability)])
+    assert gpus_run_kernels() == runs
+
+
+def test_kernels_run_on_no_gpu_without_a_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
+    def lanes() -> int:
+        raise Unsupported("no compiler")
+
+    monkeypatch.setattr(machine_code, "lanes", lanes)
+    assert not gpus_run_kernels()

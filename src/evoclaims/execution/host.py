@@ -23,7 +23,7 @@ class Host:
     Attributes:
         processes: how many are asked for; 0 for as many as are useful.
         gpus: the GPUs that they share; empty on processors.
-        together: processes that use a GPU well.
+        together: processes for each GPU, where conditions are more than GPUs and no number is asked for.
     """
 
     processes: int
