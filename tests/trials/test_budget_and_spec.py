@@ -19,7 +19,7 @@ from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.cma_es import CmaEs
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.methods.neat.evolution import Neat
-from evoclaims.methods.neat.settings import Settings, Species
+from evoclaims.methods.neat.settings import Attribute, Mutation, Settings
 from evoclaims.methods.ppo import Ppo
 from evoclaims.methods.random_search import RandomSearch
 from evoclaims.methods.training_loop import TrainingLoop
@@ -152,7 +152,7 @@ def _mine(has: dict[str, Any], *lacks: str, frozen: bool = True) -> Any:
         ("method", CmaEs(network=AllSkips(24.0)), r"AllSkips has hidden=24\.0\. Write whole numbers"),  # type: ignore[arg-type]
         ("method", CmaEs(network=Mlp((8, 8.0))), r"Mlp has layers=\(8, 8\.0\)\. .* \(tuple\[int, \.\.\.\]\)"),  # type: ignore[arg-type]
         ("method", Ppo(entropy_cost=math.nan), r"Ppo has entropy_cost=nan\. Write a number in place of nan\."),
-        ("method", Neat(Settings(species=Species(disjoint=math.nan))), "Species has disjoint=nan"),
+        ("method", Neat(Settings(mutation=Mutation(weight=Attribute(mean=math.nan)))), "Attribute has mean=nan"),
         ("method", Ppo(normalize_observations=1), r"Ppo has normalize_observations=1\. Write True or False\."),  # type: ignore[arg-type]
         ("task", SteppingStones(shows_goal="no"), r"SteppingStones has shows_goal='no'\. Write True or False\."),  # type: ignore[arg-type]
         ("method", RandomSearch(8, network=Mlp), "A field of RandomSearch is not a number, word"),  # type: ignore[arg-type]
