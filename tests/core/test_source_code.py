@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import cmath
 import importlib
+import math
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import jax.numpy
 import pytest
 
 from evoclaims import TrainingLoop
-from evoclaims.core.source_code import ARRAYS, code_of, is_edited
+from evoclaims.core.source_code import PARTS, code_of, is_edited
 from evoclaims.envs import NParity
 from evoclaims.methods import HandBuilt
 
@@ -93,10 +96,14 @@ def found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Found]:
             sys.modules.pop(name, None)
 
     def find(
-        old: str = "", new: str = "", make: Callable[[Any], Any] = lambda module: module.Own(), method: str = METHOD
+        old: str = "",
+        new: str = "",
+        make: Callable[[Any], Any] = lambda module: module.Own(),
+        method: str = METHOD,
+        helpers: str = HELPERS,
     ) -> dict[str, str]:
-        assert old in method + HELPERS
-        for name, text in zip(names, (method, HELPERS), strict=True):
+        assert old in method + helpers
+        for name, text in zip(names, (method, helpers), strict=True):
             (tmp_path / f"{name}.py").write_text(text.replace(old, new) if old else text, encoding="utf-8")
         forget()
         importlib.invalidate_caches()
@@ -157,7 +164,48 @@ def test_arrays_and_objects_are_part_of_it_and_records_of_older_releases_lack_th
     assert one == same != other
     assert is_edited(one, other)
     assert is_edited(None, one)
-    assert not is_edited(one.partition(ARRAYS)[0], other)
+    assert not is_edited(one.partition(PARTS)[0], other)
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        "MADE = partial(moved, far={0})",
+        "MADE = jax.jit(partial(moved, far={0}))",
+        "MADE = bytes([{0}])",
+        "MADE = {{'first': moved, 'second': range({0})}}",
+        "def maker(far):\n    def made(x):\n        return x + far\n    return made\nMADE = maker({0})",
+        "FAR = {0}\nMADE = partial(moved, far=FAR)",
+        "MADE = {{}}\nMADE['only'] = (jax.numpy.sin, jax.numpy.cos)[{0} - 1]",
+        "if UNUSED:\n    MADE = [jax.numpy.sin, {0}]",
+        "from jax.numpy import log{0}p as MADE",
+        "import math{0} as MADE",
+        "from its_helpers import ONE as MADE",
+        "from its_helpers import *\nMADE = partial(moved, far=ONE)",
+        "MADE = its_helpers.ONE",
+        "MADE = its_helpers.OTHER",
+        "def MADE():\n    from its_helpers import ONE",
+    ],
+)
+def test_what_makes_an_object_is_part_of_it_and_records_of_older_releases_lack_it(
+    found: Found, monkeypatch: pytest.MonkeyPatch, made: str
+) -> None:
+    for number, name in enumerate(("log1p", "log2p")):
+        monkeypatch.setattr(f"jax.numpy.{name}", (jax.numpy.sin, jax.numpy.cos)[number], raising=False)
+        monkeypatch.setitem(sys.modules, f"math{1 + number}", (math, cmath)[number])
+
+    def hashed(value: str) -> str:
+        method = METHOD.replace("moved(x, RATE)", "moved(x, MADE)") + made.format(value)
+        other = "@dataclass(frozen=True)\nclass Other:\n    def more(self):\n        return"
+        helpers = f"{HELPERS}\n{other} {value}\n\nONE = bytes([{value}])\nOTHER = Other()\n"
+        return found(method=method, helpers=helpers)["its_method.Own"]
+
+    one, same, other = map(hashed, "112")
+    assert one == same != other
+    assert is_edited(one, other)
+    older = one.rpartition(PARTS)[0].rstrip(PARTS)
+    assert older
+    assert not is_edited(older, other)
 
 
 def test_the_last_bits_of_an_array_are_no_edit(found: Found) -> None:

@@ -105,9 +105,10 @@ def _declared(kind: type) -> tuple[tuple[str, str, bool], ...]:
     return tuple((name, word, WHOLE.fullmatch(word) is not None) for name, word in words.items())
 
 
-def is_own(kind: type) -> bool:
-    """Whether a class is of this package."""
-    return kind.__module__.partition(".")[0] == __name__.partition(".")[0]
+def is_own(one: Any) -> bool:
+    """Whether a class, a function or a module is of this package."""
+    module: str = getattr(one, "__module__", None) or one.__name__
+    return module.partition(".")[0] == __name__.partition(".")[0]
 
 
 def canonical_json(value: Any) -> str:

@@ -10,6 +10,7 @@ import sys
 import sysconfig
 from collections.abc import Iterator, Mapping
 from functools import cache, partial
+from importlib.util import resolve_name
 from pathlib import Path
 from textwrap import dedent
 from types import ModuleType
@@ -27,8 +28,8 @@ CODE: Final = "code_hashes"
 DIGITS: Final = 16
 """Of a hash that are kept."""
 
-ARRAYS: Final = ":"
-"""Between a hash and that of the arrays, sets and dataclasses that the code names, if there are any."""
+PARTS: Final = ":"
+"""Between the parts of a hash: of the code; of arrays, sets and dataclasses that it names; of other objects."""
 
 _IN_THE_ID: Final = ("name", "revision", "packages")
 """Class variables of a method or task that its trials' ids or versions hold."""
@@ -45,8 +46,9 @@ def code_of(*components: Any) -> dict[str, str]:
 
     Classes of this package and of installed ones are left out: trials record their versions. A hash is of the class,
     its bases, and the functions, classes, constants, arrays, sets and dataclasses that these name, directly or through
-    each other. Comments, docstrings, layout and what ids hold anyhow (values of fields, `revision`) do not count. What
-    is reached in other ways, such as by the attribute of an object, is not seen.
+    each other; of other objects that they name, the statements of the module that make them, and what these name.
+    Comments, docstrings, layout and what ids hold anyhow (values of fields, `revision`) do not count. What is reached
+    in other ways, such as by a name that is made of words, is not seen.
     """
     code = {one for component in components for one in _code(component)}
     found = {f"{one.__module__}.{one.__qualname__}": _hash(one) for one in code if _is_the_projects(one)}
@@ -54,8 +56,8 @@ def code_of(*components: Any) -> dict[str, str]:
 
 
 def is_edited(then: str | None, now: str) -> bool:
-    """Whether a recorded hash is of other code than the present one; older records have no part for arrays."""
-    return then not in (now, now.partition(ARRAYS)[0])
+    """Whether a recorded hash is of other code than the present one; older records have fewer parts."""
+    return then is None or not (now + PARTS).startswith(then + PARTS)
 
 
 def _code(component: Any) -> Iterator[Any]:
@@ -99,7 +101,7 @@ def _is_installed(file: Path) -> bool:
 
 @cache
 def _is_the_projects(one: Any) -> bool:
-    """Whether a class or function is of the user's own files: not of this package, Python's, or an installed one."""
+    """Whether a class, function or module is of the user's own files: not this package's, Python's, or installed."""
     if is_own(one):
         return False
     try:
@@ -111,30 +113,131 @@ def _is_the_projects(one: Any) -> bool:
 @cache
 def _hash(code: Any) -> str:
     """Return a hash of the code of a class or function and of all of the project's that it names."""
-    found: dict[str, Any] = {}
+    code_found: dict[str, Any] = {}
     arrays: dict[str, Any] = {}
-    held = [code]
-    while held:
-        one = _bare(held.pop())
-        kind_of_code = inspect.isclass(one) or inspect.isfunction(one)
-        if not kind_of_code or not _is_the_projects(one):
-            continue
-        name = f"{one.__module__}.{one.__qualname__}"
+    objects: dict[str, Any] = {}
+    held, later = [code], list[Any]()
+    found, contained = code_found, arrays
+    while held or later:
+        if not held:  # what is reached through objects alone is a part that older records lack
+            held, later = later, []
+            found = contained = objects
+        one = held.pop()
+        one = one if isinstance(one, _Variable) else _bare(one)
+        name, tree, module = _read(one)
         # Functions may name each other in circles: each is hashed once.
-        if name in found:
+        if tree is None or name in code_found or name in objects:
             continue
-        tree = _tree(one)
         # The syntax tree and not the text, so that a comment or a new layout does not look like an edit.
         found[name] = _as_lists(tree)
         held += one.__bases__ if inspect.isclass(one) else ()
-        for word, value in _named(tree, vars(sys.modules.get(one.__module__, one))):
+        for word, value, variable in _named(tree, module):
             if _is_constant(value):
                 found[f"{name}: {word}"] = repr(value)
             elif (contents := _contents(value)) is not None:
-                arrays[f"{name}: {word}"] = contents
+                contained[f"{name}: {word}"] = contents
+                later += _code(value)
             else:
                 held.append(value)
-    return content_hash(found)[:DIGITS] + (ARRAYS + content_hash(arrays)[:DIGITS] if arrays else "")
+                later.append(variable)
+        for node, alias in _imports(ast.walk(tree)):  # also within a function
+            if source := _imported_from(node, module):
+                later += [_Variable(source, alias.name), getattr(source, alias.name, None)]
+    parts = [content_hash(part)[:DIGITS] if part else "" for part in (code_found, arrays, objects)]
+    return PARTS.join(parts).rstrip(PARTS)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Variable:
+    """A name in a module."""
+
+    module: ModuleType
+    word: str
+
+
+def _read(one: Any) -> tuple[str, ast.Module | None, ModuleType]:
+    """Return the name, the syntax tree and the module of a class, function or variable; no tree of what has none."""
+    if isinstance(one, _Variable):
+        origin = _origin(one)
+        return f"{origin.module.__name__}: {origin.word}", _making(origin), origin.module
+    module = sys.modules.get(getattr(one, "__module__", None) or "")
+    kind_of_code: bool = inspect.isclass(one) or inspect.isfunction(one)
+    if module is None or not kind_of_code or not _is_the_projects(one):
+        return "", None, ast
+    return f"{one.__module__}.{one.__qualname__}", _tree(one), module
+
+
+def _origin(variable: _Variable) -> _Variable:
+    """Return the variable of a project's module that one is imported from, or itself."""
+    for node, alias in _bindings(variable.module)[1]:
+        word = variable.word if alias.name == "*" else alias.name
+        source = _imported_from(node, variable.module)
+        if source and variable.word == (alias.asname or word) and hasattr(source, word):
+            return _origin(_Variable(source, word))
+    return variable
+
+
+def _making(variable: _Variable) -> ast.Module | None:
+    """Return the statements that make a variable, or what it is another name of; None if there are neither."""
+    statements, imports = _bindings(variable.module)
+    made = [*statements.get(variable.word, ())]
+    for _, alias in imports:
+        if variable.word == alias.asname:
+            value = getattr(variable.module, variable.word, None)
+            # `from jax import numpy as np` is `import jax.numpy as np`.
+            made.append(ast.Expr(ast.Constant(value.__name__ if isinstance(value, ModuleType) else alias.name)))
+    return ast.Module(made, []) if made else None
+
+
+@cache
+def _bindings(module: ModuleType) -> tuple[dict[str, list[ast.stmt]], list[tuple[ast.AST, ast.alias]]]:
+    """Return the statements that give each variable of a project's module a value, and what the module imports."""
+    try:
+        text = ast.parse(inspect.getsource(module) if _is_the_projects(module) else "")
+    except (OSError, TypeError, SyntaxError):  # its text cannot be had
+        text = ast.Module([], [])
+    made: dict[str, list[ast.stmt]] = {}
+    for statement in text.body:
+        for word in dict.fromkeys(map(_changed, _outside(statement))):
+            if word is not None:
+                made.setdefault(word, []).append(statement)
+    return made, list(_imports(_outside(text)))
+
+
+def _imports(nodes: Iterator[ast.AST]) -> Iterator[tuple[ast.AST, ast.alias]]:
+    """Yield what statements import."""
+    for node in nodes:
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            yield from ((node, alias) for alias in node.names)
+
+
+def _outside(node: ast.AST) -> Iterator[ast.AST]:
+    """Yield what is outside of functions and classes."""
+    if not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef | ast.Lambda):
+        yield node
+        for part in ast.iter_child_nodes(node):
+            yield from _outside(part)
+
+
+def _changed(node: Any) -> str | None:
+    """Return the name that a node gives a value, or changes a part of."""
+    if not isinstance(getattr(node, "ctx", None), ast.Store):
+        return None
+    while isinstance(node, ast.Attribute | ast.Subscript):
+        node = node.value
+    return node.id if isinstance(node, ast.Name) else None
+
+
+def _imported_from(node: ast.AST, there: ModuleType) -> ModuleType | None:
+    """Return the project's module that a statement imports from; None for others."""
+    if not isinstance(node, ast.ImportFrom):
+        return None
+    try:
+        name = resolve_name("." * node.level + (node.module or ""), there.__package__)
+    except ImportError:
+        return None
+    module = sys.modules.get(name)
+    return module if module is not None and _is_the_projects(module) else None
 
 
 def _bare(one: Any) -> Any:
@@ -220,7 +323,7 @@ def _is_in_the_id(statement: ast.AnnAssign) -> bool:
     return not variable or ast.unparse(statement.target) in _IN_THE_ID
 
 
-def _named(tree: ast.Module, there: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+def _named(tree: ast.Module, module: ModuleType) -> Iterator[tuple[str, Any, _Variable]]:
     """Yield what a module has of the names that code uses, and what modules have that it names as "module.name"."""
     for node in ast.walk(tree):
         words: list[str] = []
@@ -228,12 +331,12 @@ def _named(tree: ast.Module, there: Mapping[str, Any]) -> Iterator[tuple[str, An
         while isinstance(held, ast.Attribute):
             words.insert(0, held.attr)
             held = held.value
-        if not isinstance(held, ast.Name) or held.id not in there:
+        if not isinstance(held, ast.Name) or held.id not in vars(module):
             continue
-        name, value = held.id, there[held.id]
+        name, value, variable = held.id, vars(module)[held.id], _Variable(module, held.id)
         for word in words:
             if not isinstance(value, ModuleType) or isinstance(value, Later) or not hasattr(value, word):
                 break  # a module that is imported later is no project's
-            name, value = f"{name}.{word}", getattr(value, word)
+            name, value, variable = f"{name}.{word}", getattr(value, word), _Variable(value, word)
         else:
-            yield name, value
+            yield name, value, variable
