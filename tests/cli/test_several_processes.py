@@ -256,8 +256,10 @@ def test_two_processes_share_a_gpu_under_mps_where_batches_are_more_than_gpus() 
 def test_processes_are_as_many_as_keep_the_cores_busy() -> None:
     running = [_batch(str(i), 1000.0, 0.0, Layout.ALONE) for i in range(50)]  # ten trials each
     compiling = [_batch(str(i), 0.0, 10.0, Layout.ALONE) for i in range(50)]
-    assert useful_processes(running, 64) == 6
+    assert useful_processes(running, 64) == 7
     assert useful_processes(running, 2) == 1
+    assert useful_processes([*running, _batch("compiled", 0.0, 4_000.0, Layout.ALONE)], 2) == 1
+    assert useful_processes([*running, _batch("compiled", 0.0, 10_000.0, Layout.ALONE)], 2) == 2
     assert useful_processes(compiling, 64) == 64
     assert useful_processes(compiling, 2) == 2
     assert len(seats_of(Host(AUTO, ()), compiling[:1])) == 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import queue
 import signal
@@ -110,6 +111,9 @@ ATTEMPTS: Final = 3
 
 SMALL: Final = 1 / 8
 """Conditions that share programs are run by one process if they take less than this part of what each has to do."""
+
+TOO_IDLE: Final = 0.1
+"""A process that would be busy for less than this part of the time is not worth its start."""
 
 NEAR: Final = 6
 """Among how many groups, the longest first, a process looks for one whose task it has traced already."""
@@ -341,7 +345,7 @@ def useful_processes(batches: Sequence[MissingBatch], cores: int) -> int:
     """Return how many processes keep some cores busy: compiling takes one, running as many as there are trials."""
     alone = sum(batch.cost.seconds() for batch in batches)
     in_parallel = sum(batch.cost.seconds(cores) for batch in batches)
-    return max(round(cores * in_parallel / alone), 1)
+    return max(math.ceil(cores * in_parallel / alone - TOO_IDLE), 1)
 
 
 def _a_gpu_each(found: Sequence[str], batches: Sequence[MissingBatch], together: int) -> list[Seat]:
