@@ -20,6 +20,7 @@ from evoclaims.methods import HandBuilt
 
 METHOD = '''
 """A method."""
+import dataclasses
 from dataclasses import dataclass
 from functools import partial
 from typing import ClassVar
@@ -157,6 +158,14 @@ def test_lists_and_tables_of_constants_are_part_of_it(found: Found, table: str) 
         "[0.5, {{'rate': jax.numpy.ones({0})}}]",
         "CmaEs({0}0)",
         "frozenset([{0}])",
+        "partial(max, {0})",
+        "jax.jit(partial(max, {0}))",
+        "[partial(max, {0})]",
+        "{{'rate': lambda x: {0}}}",
+        "type('', (), {{}})\n\n\nclass RATE:\n    rate: float = {0}",
+        "{0}\n\n\nclass RATE:\n    rate: float = RATE",
+        "1\n\n\n@dataclass(frozen=True)\nclass RATE(Part):\n    rate: float = {0}",
+        "1\n\n\n@dataclass\nclass RATE:\n    rate: list = dataclasses.field(default_factory=lambda: {0})",
     ],
 )
 def test_arrays_and_objects_are_part_of_it_and_records_of_older_releases_lack_them(found: Found, table: str) -> None:
@@ -208,6 +217,12 @@ def test_what_makes_an_object_is_part_of_it_and_records_of_older_releases_lack_i
     assert not is_edited(older, other)
 
 
+def test_what_a_base_that_is_no_dataclass_says_is_part_of_it(found: Found) -> None:
+    method = METHOD.replace("Own(CmaEs):", "Own(Mixin, CmaEs):").replace("UNUSED", "class Mixin:\n    far: int")
+    one, other = (found("far: int = 1", f"far: int = {far}", method=method)["its_method.Own"] for far in (2, 3))
+    assert one != other
+
+
 def test_the_last_bits_of_an_array_are_no_edit(found: Found) -> None:
     tables = ("jax.numpy.array([0.1, 0.3, 0.0])", "jax.numpy.array([0.1, 0.3 + 3e-8, -1e-17])")
     one, other = (found("RATE = 0.5", f"RATE = {table}") for table in tables)
@@ -228,6 +243,7 @@ def test_the_base_of_a_part_is_part_of_it(found: Found) -> None:
         ("y = moved(x, RATE)", "y = moved(\n            x, RATE\n        )"),
         ("revision: ClassVar[int] = 1", "revision: ClassVar[int] = 2"),
         ("spread: float = 0.5", "spread: float = 0.25"),
+        ("width: int = 3", "width: int = 4"),
         ("UNUSED = 1", "UNUSED = 2"),
         ("def unused(x):\n    return x", "def unused(x):\n    return -x"),
     ],

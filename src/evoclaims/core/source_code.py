@@ -51,7 +51,8 @@ def code_of(*components: Any) -> dict[str, str]:
     in other ways, such as by a name that is made of words, is not seen.
     """
     code = {one for component in components for one in _code(component)}
-    found = {f"{one.__module__}.{one.__qualname__}": _hash(one) for one in code if _is_the_projects(one)}
+    parts = frozenset(one for one in code if inspect.isclass(one))
+    found = {f"{one.__module__}.{one.__qualname__}": _hash(one, parts) for one in code if _is_the_projects(one)}
     return {name: found[name] for name in sorted(found)}
 
 
@@ -111,8 +112,11 @@ def _is_the_projects(one: Any) -> bool:
 
 
 @cache
-def _hash(code: Any) -> str:
-    """Return a hash of the code of a class or function and of all of the project's that it names."""
+def _hash(code: Any, parts: frozenset[type]) -> str:
+    """Return a hash of the code of a class or function and of all of the project's that it names.
+
+    Fields of `parts`, the classes of the components with it, are in ids.
+    """
     code_found: dict[str, Any] = {}
     arrays: dict[str, Any] = {}
     objects: dict[str, Any] = {}
@@ -130,6 +134,8 @@ def _hash(code: Any) -> str:
             continue
         # The syntax tree and not the text, so that a comment or a new layout does not look like an edit.
         found[name] = _as_lists(tree)
+        if not (dataclasses.is_dataclass(one) and any(one in part.__mro__ for part in parts)):
+            objects |= {f"{name}.{word}": default for word, default in _defaults(one)}
         held += one.__bases__ if inspect.isclass(one) else ()
         for word, value, variable in _named(tree, module):
             if _is_constant(value):
@@ -143,8 +149,8 @@ def _hash(code: Any) -> str:
         for node, alias in _imports(ast.walk(tree)):  # also within a function
             if source := _imported_from(node, module):
                 later += [_Variable(source, alias.name), getattr(source, alias.name, None)]
-    parts = [content_hash(part)[:DIGITS] if part else "" for part in (code_found, arrays, objects)]
-    return PARTS.join(parts).rstrip(PARTS)
+    hashes = (content_hash(part)[:DIGITS] if part else "" for part in (code_found, arrays, objects))
+    return PARTS.join(hashes).rstrip(PARTS)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -192,10 +198,7 @@ def _making(variable: _Variable) -> ast.Module | None:
 @cache
 def _bindings(module: ModuleType) -> tuple[dict[str, list[ast.stmt]], list[tuple[ast.AST, ast.alias]]]:
     """Return the statements that give each variable of a project's module a value, and what the module imports."""
-    try:
-        text = ast.parse(inspect.getsource(module) if _is_the_projects(module) else "")
-    except (OSError, TypeError, SyntaxError):  # its text cannot be had
-        text = ast.Module([], [])
+    text = _parsed(module) if _is_the_projects(module) else ast.Module([], [])
     made: dict[str, list[ast.stmt]] = {}
     for statement in text.body:
         for word in dict.fromkeys(map(_changed, _outside(statement))):
@@ -288,21 +291,40 @@ def _contents(value: Any) -> Any:
         return None
 
 
-def _tree(one: Any) -> ast.Module:
-    """Return the code of a class or function without what does not count; empty where its text cannot be had."""
+def _parsed(one: Any) -> ast.Module:
+    """Return the code of a class, a function or a project's module; empty where its text cannot be had."""
     try:
-        tree = ast.parse(dedent(inspect.getsource(one)))
+        return ast.parse(dedent(inspect.getsource(one)))
     except (OSError, TypeError, SyntaxError):
         return ast.Module([], [])
+
+
+def _tree(one: Any) -> ast.Module:
+    """Return the code of a class or function without what does not count."""
+    tree = _parsed(one)
     for node in ast.walk(tree):
         if isinstance(node, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
             if ast.get_docstring(node) is not None:
                 node.body = node.body[1:] or [ast.Pass()]
             if isinstance(node, ast.ClassDef):
-                for statement in node.body:
-                    if isinstance(statement, ast.AnnAssign) and _is_in_the_id(statement):
-                        statement.value = None
+                for statement in _held_by_ids(node):
+                    statement.value = None
     return tree
+
+
+def _defaults(one: Any) -> Iterator[tuple[str, Any]]:
+    """Yield the names and defaults of a class's fields, which ids hold only if it is a component's."""
+    classes = [node for node in _parsed(one).body if isinstance(node, ast.ClassDef)]
+    for statement in (statement for node in classes for statement in _held_by_ids(node) if statement.value):
+        word = ast.unparse(statement.target)
+        value = vars(one).get(word, ast)  # a module, which is no constant
+        if word not in _IN_THE_ID:
+            yield word, repr(value) if _is_constant(value) else _as_lists(statement.value)
+
+
+def _held_by_ids(node: ast.ClassDef) -> list[ast.AnnAssign]:
+    """Return the fields of a component's class, and the class variables that ids or versions hold."""
+    return [each for each in node.body if isinstance(each, ast.AnnAssign) and _is_in_the_id(each)]
 
 
 def _as_lists(node: Any) -> Any:
