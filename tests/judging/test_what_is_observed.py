@@ -14,6 +14,7 @@ from evoclaims.core.errors import UserError
 from evoclaims.judging.design import FIXED_10, Design
 from evoclaims.judging.exact import rank_test
 from evoclaims.judging.judge import judge
+from evoclaims.judging.kinds.greater import GreaterTests
 from evoclaims.judging.measure import Measure
 from evoclaims.judging.verdict import Outcome
 from evoclaims.judging.window import EVERYTHING, Window, shared
@@ -103,6 +104,17 @@ def test_the_interval_of_a_median_says_where_observation_ends(source) -> None:
     (interval,) = judge(a < 50, FIXED_10).evidence[0].intervals
     assert interval.of == "median, 95% percentile bootstrap, nothing beyond 80"
     assert (interval.low, interval.high) == (10.0, 80.0)
+
+
+@given(st.lists(st.tuples(times, times, times), min_size=2, max_size=8), st.integers(1, 7))
+def test_times_between_reports_never_show_more_than_the_times_themselves(spans, first) -> None:
+    known = [sorted(span) for span in spans]
+    a, b = known[: min(first, len(known) - 1)], known[min(first, len(known) - 1) :]
+    (least_a, true_a, most_a), (least_b, true_b, most_b) = zip(*a, strict=True), zip(*b, strict=True)
+    between, true = GreaterTests(most_a, most_b, 0.71, (least_a, least_b)), GreaterTests(true_a, true_b, 0.71)
+    assert between.p.supported >= true.p.supported
+    assert between.p.refuted >= true.p.refuted
+    assert between.p.smaller >= true.p.smaller
 
 
 @pytest.mark.parametrize("better", ["higher", "lower"])

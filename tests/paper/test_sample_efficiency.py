@@ -168,6 +168,37 @@ def test_budgets_of_two_lengths_are_compared_up_to_the_shorter(group: Any) -> No
     assert {sample.limit for sample in verdict.evidence[0].samples} == {2.0 * COST}
 
 
+SPARSE, DENSE = (20, 40, 60), range(2, 61, 2)
+
+
+@pytest.mark.parametrize(
+    ("ours", "theirs", "ours_at", "theirs_at", "outcome"),
+    [
+        ((10, 20, 30, 40, 50, 60), (5, 15, 25, 35, 45, 55, 60), 12, 12, Outcome.INCONCLUSIVE),
+        ((10, 20, 30, 40, 50, 60), (5, 15, 25, 35, 45, 55, 60), 26, 12, Outcome.SUPPORTED),
+        ((10, 20, 30, 40, 50, 60), (5, 15, 25, 35, 45, 55, 60), 99, 12, Outcome.SUPPORTED),
+        ((10, 20, 30, 40, 50, 60), (5, 15, 25, 35, 45, 55, 60), 12, 56, Outcome.REFUTED),
+        (SPARSE, (3, 23, 43, 60), 22, 22, Outcome.INCONCLUSIVE),
+        (SPARSE, SPARSE, 22, 12, Outcome.SUPPORTED),
+        ((1, 10, 60), (1, 10, 60), 12, 9, Outcome.SUPPORTED),
+        (DENSE, SPARSE, 22, 12, Outcome.SUPPORTED),
+        (DENSE, SPARSE, 12, 4, Outcome.INCONCLUSIVE),
+    ],
+)
+def test_where_a_side_reports_does_not_make_it_faster(
+    ours: Sequence[int], theirs: Sequence[int], ours_at: int, theirs_at: int, outcome: Outcome, tmp_path: Path
+) -> None:
+    measures = []
+    for name, steps, reached in (("ours", ours, ours_at), ("theirs", theirs, theirs_at)):
+        rows = [f"{seed},{at},{9 if at >= reached else 1}" for seed in range(10) for at in steps]
+        (tmp_path / f"{name}.csv").write_text("\n".join(["seed,step,return", *rows]))
+        condition = Imported(f"{name}.csv", "seed", "return", step="step", folder=tmp_path)
+        group = TrialGroup(name, "small", condition, lambda asked, seeds: [asked.existing[seed] for seed in seeds])
+        measures.append(group.steps_to("return", 5))
+    assert judge(measures[1] < measures[0], Design.fixed(10)).outcome is outcome
+    assert judge(2 * measures[1] < 2 * measures[0], Design.fixed(10)).outcome is outcome
+
+
 @pytest.fixture
 def imported(tmp_path: Path) -> Callable[[Sequence[int]], TrialGroup]:
     """A function that imports ten trials with reports at these steps, which are above 5 from the last but one on."""
@@ -232,3 +263,25 @@ def test_a_loop_that_reports_more_seldom_than_its_budget_says_is_no_slower_one(e
             measure.of(trial)
     else:
         assert measure.of(trial) == reached
+
+
+@pytest.mark.parametrize(
+    ("every", "reached", "outcome"),
+    [(7, 5, Outcome.INCONCLUSIVE), (7, 25, Outcome.SUPPORTED), (5, 25, Outcome.SUPPORTED)],
+)
+def test_a_loop_whose_reports_lie_elsewhere_is_no_slower_one(every: int, reached: int, outcome: Outcome) -> None:
+    """Reports of every seventh step, of which one is kept after every ten, are at 14, 21, 35."""
+    budget = Budget(environment_steps=120, reports=12)
+    groups = []
+    for name, each, value in (("ours", 10, 5), ("theirs", every, reached)):
+        kept = [min(at for at in range(each, 400, each) if at >= ten) for ten in range(10, 121, 10)]
+        condition = Condition(TrainingLoop(f"its_loops:{name}", packages=()), PLAIN.task, "whole_budget", budget)
+        curves = {
+            "environment_steps": kept,
+            "fitness": [float(at >= value) for at in kept],
+            "level": [LAST] * len(kept),
+        }
+        trials = [made(condition, curves, seed, digest="") for seed in range(10)]
+        groups.append(TrialGroup(name, "small", condition, lambda asked, seeds, mine=tuple(trials): mine[: len(seeds)]))
+    ours, theirs = (group.steps_to("fitness", 1) for group in groups)
+    assert judge(ours < theirs, Design.fixed(10)).outcome is outcome

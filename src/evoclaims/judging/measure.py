@@ -65,11 +65,12 @@ class Measure(NumberReading):
         """
         if not _is_number(factor) or not 0 < factor < math.inf:
             raise UserError(f"{self.describe()!r} is multiplied by {factor!r}. Use a finite number above 0.")
-        written = repr(float(factor)).removesuffix(".0")
+        written, before = repr(float(factor)).removesuffix(".0"), self.before
         return replace(
             self,
             name=f"{written} × {self.name}",
             read=lambda trial: product(factor, self._at_least_0(trial)),
+            before=before and (lambda trial: product(factor, before(trial))),
             window=self.window.scaled(factor),
         )
 

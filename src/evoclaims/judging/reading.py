@@ -85,6 +85,7 @@ class NumberReading(ScalarReading):
         window: how far and how finely values are observed.
         unit: what the number counts, such as "in metres"; empty where nothing is known. Two units are not compared.
         refusal: why it is not read from any trial; empty if it is.
+        before: reads what the number is surely above, such as the step of the report before; None for exact numbers.
     """
 
     read: Callable[[TrialResult], float]
@@ -92,6 +93,7 @@ class NumberReading(ScalarReading):
     window: Window = EVERYTHING
     unit: str = ""
     refusal: str = ""
+    before: Callable[[TrialResult], float] | None = None
 
     def __post_init__(self) -> None:
         """Reject an unknown direction."""
@@ -135,7 +137,27 @@ class NumberReading(ScalarReading):
         """Return the number of one trial, as far as it is observed; the worst value for a failed one."""
         if self.refusal:
             raise UnreadableTrialError(self.refusal)
-        return self.window.seen(read_number(trial, self.describe(), self.read, _worst(self.better)))
+        return self.window.seen(self._number(trial))
+
+    def _number(self, trial: TrialResult) -> float:
+        return read_number(trial, self.describe(), self.read, _worst(self.better))
+
+    def is_shown(self, trials: Trials) -> bool:
+        """Whether each trial's number is known as finely as the window has it."""
+        if (before := self.before) is None or not self.window.every:
+            return True
+        done = (trial for trial in trials[self.source.fingerprint] if not is_failed(trial))
+        return all(self.window.shows(before(checked(trial)), self._number(trial)) for trial in done)
+
+    def spans(self, trials: Trials) -> tuple[list[float], list[float]]:
+        """Return what each trial's number is at least, and at most; numbers beyond the limit are infinite."""
+        limit, least, most = self.window.limit, [], []
+        for trial in trials[self.source.fingerprint]:
+            number = self._number(trial)
+            known = number if self.before is None or is_failed(trial) else self.before(checked(trial))
+            most.append(number if number <= limit else math.inf)
+            least.append(math.inf if known >= limit and number > limit else math.nextafter(known, number))
+        return least, most
 
 
 AnyNumber = TypeVar("AnyNumber", bound=NumberReading)

@@ -38,11 +38,13 @@ class Window:
         limit: a larger value is only known to be larger (it is censored), and counts as infinite.
         every: a value is only known up to a multiple of this, and counts as the next one; 0 for exact values.
         as_reported: a value that is no multiple counts as it is, unless a window that is shared makes it coarser.
+        steps: of reports that are the same in all trials; empty where nobody knows, or where they are multiples.
     """
 
     limit: float = math.inf
     every: float = 0.0
     as_reported: bool = False
+    steps: tuple[float, ...] = ()
 
     def seen(self, value: float) -> float:
         """Return what is known of a value."""
@@ -51,6 +53,12 @@ class Window:
         if not self.every or self.as_reported or math.isinf(value):
             return value
         return min(math.ceil(value / self.every - _ROUNDING) * self.every, self.limit)
+
+    def shows(self, before: float, value: float) -> bool:
+        """Whether numbers above `before`, up to `value`, are seen alike, or lie between two reports of all trials."""
+        if self.as_reported:
+            return bool(self.steps)
+        return self.seen(before + 2 * _ROUNDING * self.every) == self.seen(value)
 
     def scaled(self, factor: float) -> Window:
         """Return the window of values that are multiplied by a factor above 0."""
@@ -67,7 +75,7 @@ def shared(windows: Sequence[Window]) -> Window:
     Raises:
         UserError: when the coarsest is no multiple of another one, or none of its multiples is below the limit.
     """
-    if len(set(windows)) == 1:
+    if len(set(windows)) == 1 and (windows[0].steps or not windows[0].as_reported):
         return windows[0]
     every, limit = max(window.every for window in windows), min(window.limit for window in windows)
     if every:

@@ -48,6 +48,10 @@ def steps_to(source: Source, condition: Condition, curve: str, value: float, lev
     every = max(condition.report_distance, 1)
     name = f"environment steps until {curve} is {float(value):.12g}" + f" on level {wanted}" * (levels > 1)
 
+    def before(trial: TrialResult) -> float:
+        first = read(trial)
+        return max((at for at in trial.curves[_AXIS] if at < first), default=0.0)
+
     def read(trial: TrialResult) -> float:
         steps = trial.curves[_AXIS]
         reports = zip(steps, trial.curves[curve], _trained_levels(trial, levels), strict=True)
@@ -62,18 +66,18 @@ def steps_to(source: Source, condition: Condition, curve: str, value: float, lev
                 "and nobody knows when it would have reached that: "
                 f"{advice}ask for a value that ended trials have reached"
             )
-        before = max((at for at in steps if at < first), default=0.0)
-        if condition.loop and first - before > 2 * every and not math.isinf(first):  # it reports when it likes
+        last = max((at for at in steps if at < first), default=0.0)
+        if condition.loop and first - last > 2 * every and not math.isinf(first):  # it reports when it likes
             raise UnreadableTrialError(
-                f"The trial of seed {trial.seed_in_words} of {source.label} reports nothing between {before:,.12g} and "
+                f"The trial of seed {trial.seed_in_words} of {source.label} reports nothing between {last:,.12g} and "
                 f"{first:,.12g} environment steps, where {curve!r} reaches {value:g}, and its budget has reports "
                 f"{every:,} apart: call report(...) as often, or give all compared conditions fewer reports"
             )
         return first
 
     # Reports of imported trials are perhaps unevenly far apart, at steps that are no multiples of the longest distance.
-    window = Window(budget, float(condition.report_distance), as_reported=imported)
-    return Measure(source, name, read, "lower", window)
+    window = Window(budget, float(condition.report_distance), imported, condition.report_steps)
+    return Measure(source, name, read, "lower", window, before=before)
 
 
 def _require_success(label: str, value: float) -> None:

@@ -255,6 +255,13 @@ class Imported(Condition):
         return math.ceil(longest) if longest > 1.0 else 0
 
     @cached_property
+    def report_steps(self) -> tuple[float, ...]:
+        """Those of the longest curve, if every other is a part of it from the start on; empty if one is not."""
+        curves = [trial.curves.get(STEPS, ()) for trial in self.existing]
+        longest = max(curves, key=len)
+        return longest if all(steps == longest[: len(steps)] for steps in curves) else ()
+
+    @cached_property
     def existing(self) -> tuple[TrialResult, ...]:
         """All trials of the table, at least one, in the order of its seeds.
 

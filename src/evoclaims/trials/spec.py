@@ -232,6 +232,11 @@ class Condition:
         chunk = self.budget.chunk(self.cost)
         return chunk * self.cost if chunk > 1 else 0
 
+    @property
+    def report_steps(self) -> tuple[float, ...]:
+        """The environment steps of reports, where trials exist and all report at the same ones up to their ends."""
+        return ()
+
 
 @dataclass(frozen=True)
 class TrialSpec:

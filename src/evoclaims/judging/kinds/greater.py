@@ -24,36 +24,43 @@ class GreaterTests:
         a: values of A, shape [n].
         b: values of B, shape [m].
         effect: the claimed size, P(A >= B); also of the reverse, for equality.
+        least: what the values of A and of B are at least, where `a` and `b` are what they are at most; None if equal.
+            Each test takes those that are least favourable to what it shows, and so stays valid.
     """
 
     a: Sequence[float]
     b: Sequence[float]
     effect: float
+    least: tuple[Sequence[float], Sequence[float]] | None = None
+
+    @cached_property
+    def _least(self) -> tuple[Sequence[float], Sequence[float]]:
+        return self.least or (self.a, self.b)
 
     @cached_property
     def above(self) -> ExactTest:
         """Rank test, A above B."""
-        return rank_test(self.a, self.b)
+        return rank_test(self._least[0], self.b)
 
     @cached_property
     def below(self) -> ExactTest:
         """Rank test, B above A."""
-        return rank_test(self.b, self.a)
+        return rank_test(self._least[1], self.a)
 
     @cached_property
     def smaller(self) -> ExactTest:
         """Test that A is at least B less often than claimed."""
-        return _below_size(self.a, self.b, self.effect)
+        return _below_size(self.a, self._least[1], self.effect)
 
     @cached_property
     def reverse_smaller(self) -> ExactTest:
         """Test that B is at least A less often than that."""
-        return _below_size(self.b, self.a, self.effect)
+        return _below_size(self.b, self._least[0], self.effect)
 
     @property
     def wins(self) -> float:
-        """Share of all pairs in which A is at least B: ties are wins."""
-        return _share(self.a, self.b)
+        """Share of all pairs in which A is, or may be, at least B: ties are wins."""
+        return _share(self.a, self._least[1])
 
     @property
     def p(self) -> PValues:
@@ -137,25 +144,39 @@ class Greater(Assertion):
 
     def highest(self, trials: Trials, n: int, design: Design) -> PValues:
         """Return the p of results of the missing trials that are all against it: beyond all others, without ties."""
-        a, b = self.above.sample(trials).values, self.below.sample(trials).values
-        place = {value: float(at) for at, value in enumerate(sorted({*a, *b}))}
-        of_a, of_b = [place[value] for value in a], [place[value] for value in b]
+        (least_a, a), (least_b, b) = self._spans(trials)
+        place = {value: float(at) for at, value in enumerate(sorted({*a, *b, *least_a, *least_b}))}
         low = [-1.0 - at for at in range(n)]
         high = [float(len(place) + at) for at in range(n)]
-        more, less = n - len(a), n - len(b)
-        best = GreaterTests([*of_a, *high[:more]], [*of_b, *low[:less]], design.a12_margin)
-        worst = GreaterTests([*of_a, *low[:more]], [*of_b, *high[:less]], design.a12_margin)
+
+        def tests(of_a: Sequence[float], of_b: Sequence[float]) -> GreaterTests:
+            more, less = of_a[: n - len(a)], of_b[: n - len(b)]
+            all_a, all_least_a = ([*(place[value] for value in values), *more] for values in (a, least_a))
+            all_b, all_least_b = ([*(place[value] for value in values), *less] for values in (b, least_b))
+            return GreaterTests(all_a, all_b, design.a12_margin, (all_least_a, all_least_b))
+
+        best, worst = tests(high, low), tests(low, high)
         equal = max(best.smaller.p, worst.reverse_smaller.p)
         return PValues(worst.above.p, min(best.below.p, equal), best.smaller.p)
+
+    def _spans(self, trials: Trials) -> tuple[tuple[Sequence[float], Sequence[float]], ...]:
+        """Return what the values of each side are at least and at most: equal where reports show both alike."""
+        sides = self.above, self.below
+        if not all(side.is_shown(trials) for side in sides):
+            return tuple(side.spans(trials) for side in sides)
+        return tuple((values, values) for values in (side.sample(trials).values for side in sides))
 
     def find(self, trials: Trials, design: Design, alpha: float) -> Finding:
         """Run the tests."""
         above, below = self.above.sample(trials), self.below.sample(trials)
-        tests = GreaterTests(above.values, below.values, design.a12_margin)
+        (least_a, a), (least_b, b) = self._spans(trials)
+        tests = GreaterTests(a, b, design.a12_margin, (least_a, least_b))
         detail = (
             f"at least as high in {tests.wins:.3g} of all pairs of trials "
             f"(p = {tests.smaller.p:.3g} against A12 >= {design.a12_margin:g})"
         )
+        if (least_a, least_b) != (a, b):
+            detail += "; both sides do not report at the same steps: each p is of the times least favourable to it"
         bounds = (Bound("A12 margin", design.a12_margin, on_axis=False),)
         samples = (above, below)
         return self.found(tests.p, tests.attainable, alpha, samples, detail=detail, bounds=bounds, effect=True)
