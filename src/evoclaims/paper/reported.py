@@ -91,9 +91,9 @@ def load_published(path: Path) -> Published:
     if wrong := [*_wrong_plots(plain.get("plots", {})), *_wrong_tables(plain.get("tables", {})), *_wrong_rest(plain)]:
         raise UserError(
             f"{path} has entries that are not as expected: {', '.join(wrong)}. Write [plots.TASK.QUANTITY] with a "
-            "place and methods (each with a list mean, and an error of the same length where known; scale = "
-            "[lowest, highest], precision and null), [tables.NAME] with a place and values, and trials, the number "
-            "of trials behind each mean, at least 2."
+            "place and methods (each with a list mean, and an error of the same length, from 0 up, where known; "
+            "scale = [lowest, highest], precision from 0 up, and null), [tables.NAME] with a place and values, and "
+            "trials, the number of trials behind each mean, at least 2."
         )
     return Published(plain.get("plots", {}), plain.get("tables", {}), plain.get("trials"))
 
@@ -125,22 +125,26 @@ def _is_plot(plot: Any) -> bool:
         return False
     scale = plot.get("scale", [-math.inf, math.inf])
     if not (
-        _are_numbers([plot.get("precision", 0.0), plot.get("null", 0.0)]) and _are_numbers(scale) and len(scale) == 2
+        _are_numbers([precision := plot.get("precision", 0.0), plot.get("null", 0.0)])
+        and 0 <= precision < math.inf
+        and _are_numbers(scale)
+        and len(scale) == 2
     ):
         return False
     low, high = scale
     return all(
         isinstance(numbers, dict)
         and _are_numbers(means := numbers.get("mean"))
-        and _are_numbers(errors := numbers.get("error", means))
+        and _are_numbers(errors := numbers.get("error", [0.0] * len(means)))
         and len(errors) == len(means) > 0
-        and all(low <= mean <= high for mean in means)
+        and all(0 <= error < math.inf for error in errors)  # else a number is outside an interval that is empty
+        and all(low <= mean <= high and math.isfinite(mean) for mean in means)
         for numbers in plot["methods"].values()
     )
 
 
 def _are_numbers(found: Any) -> TypeGuard[list[float]]:
-    return isinstance(found, list) and all(isinstance(one, int | float) for one in found)
+    return isinstance(found, list) and all(isinstance(one, int | float) and not isinstance(one, bool) for one in found)
 
 
 SENTENCES_FILE: Final = "sentences.toml"
