@@ -52,6 +52,13 @@ def _stays(trials: Any, on: str = "small") -> Any:
     return trials("worse", on).does_not_solve_the_last_level.stays()
 
 
+def _delay(trials: Any) -> Any:
+    """A measure of which the worse have less, and agents most."""
+    return trials.measure(
+        "delay", lambda t: 9.0 if t.metrics["mean_success"] == 0.4 else t.metrics["mean_success"], "lower"
+    )
+
+
 @pytest.mark.parametrize(
     ("asserted", "answer"),
     [
@@ -61,6 +68,7 @@ def _stays(trials: Any, on: str = "small") -> Any:
         (lambda trials: trials("better").mean_success > trials("worse").mean_success, True),
         (lambda trials: trials("worse").mean_success > trials("better").mean_success, False),
         (lambda trials: trials("worse").mean_success < trials("better").mean_success, True),
+        (lambda trials: _delay(trials("better")) > _delay(trials("worse")), False),
         # A control that the agent cannot pass: it would have to be better than itself.
         (lambda trials: _stays(trials) & (trials("better").mean_success > trials("worse").mean_success), False),
         (lambda trials: trials("better").mean_success.equivalent_to(trials("worse").mean_success, margin=0.1), True),

@@ -1,8 +1,8 @@
 """Assertions put to null agents: those that one satisfies say nothing about what was learnt.
 
 An agent takes the place of all conditions of an assertion; and, unless it stands everywhere, of the claimed ones alone:
-all but those that are only the lower side of comparisons. So "A is above B" is also put to the agent against B's own
-trials, and not to A's against the agent, which A should beat.
+all but those that are only the worse side of comparisons. So "A is better than B" is also put to the agent against B's
+own trials, and not to A's against the agent, which A should beat.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def claimed(assertion: Assertion) -> frozenset[str]:
         if isinstance(part, Compound):
             found |= claimed(part)
         elif isinstance(part, Greater):
-            found.add(part.above.source.fingerprint)
+            found.add((part.below if part.above.better == "lower" else part.above).source.fingerprint)
         else:
             found |= {source.fingerprint for source in part.sources()}
     return frozenset(found)
