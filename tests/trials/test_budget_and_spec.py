@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, make_dataclass, replace
+from dataclasses import InitVar, dataclass, field, make_dataclass, replace
 from typing import Any
 
 import pytest
@@ -170,6 +170,31 @@ def test_numbers_are_required_where_annotations_are_types_too() -> None:
         require_numbers(mine((1, 2.5), (0.0, 1.0)))
     with pytest.raises(UserError, match=r"Mine has ends=\(0.0, nan\)"):
         require_numbers(mine((1, 2), (0.0, math.nan)))
+
+
+def test_what_a_class_keeps_of_an_argument_is_a_field() -> None:
+    """Else two with other numbers would have one id."""
+
+    def keep(self: Any, scale: float) -> None:
+        object.__setattr__(self, "scale", scale)
+        object.__setattr__(self, "doubled", 2 * scale)
+
+    fields: Any = [("scale", InitVar[float]), ("doubled", float, field(init=False))]
+    taking = make_dataclass("Mine", fields[:1], namespace={"__post_init__": keep}, frozen=True)
+    writing = make_dataclass("Mine", [], namespace={"__init__": keep}, frozen=True)
+    for kind in (taking, writing):
+        with pytest.raises(UserError, match=r"Mine keeps scale, doubled, and is given scale, which are no fields"):
+            require_numbers(kind(1.0))
+    holding = make_dataclass("Mine", fields[1:], namespace={"__init__": keep}, frozen=True)
+    with pytest.raises(UserError, match=r"Mine keeps scale, and is given scale, which"):
+        require_numbers(holding(1.0))
+    deriving = make_dataclass(
+        "Mine",
+        [("scale", float)],
+        namespace={"__post_init__": lambda self: object.__setattr__(self, "doubled", 2 * self.scale)},
+        frozen=True,
+    )
+    require_numbers(deriving(1.0))
 
 
 def test_the_task_of_a_training_loop_needs_nothing_that_only_the_engine_asks_for() -> None:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import dataclasses
 import functools
 import hashlib
+import inspect
 import json
 import math
 import re
-from inspect import formatannotation
 from typing import Any, Final
 
 from evoclaims.core.errors import UserError
@@ -73,13 +73,18 @@ def require_numbers(value: Any) -> None:
 
     That is a float where an int is declared, since 16.0 would have another id than 16; anything but True and False
     where a bool is, since "no" is true to Python; and NaN, for which no comparison holds: checks such as `std <= 0` let
-    it pass, and a goal within NaN is never reached.
+    it pass, and a goal within NaN is never reached. Refuse also what is kept of an argument beside the fields.
 
     Raises:
         UserError: naming the field.
     """
     if type(value) in _UNCHANGED or not dataclasses.is_dataclass(value) or isinstance(value, type):
         return
+    if (others := _other_arguments(type(value))) and (kept := _kept_beside_fields(value)):
+        raise UserError(
+            f"{type(value).__name__} keeps {', '.join(kept)}, and is given {', '.join(others)}, which are no fields of "
+            "it: whatever their values, trials would have one id. Make them fields, such as `scale: float = 1.0`."
+        )
     for name, declared, is_whole in _declared(type(value)):
         given = getattr(value, name)
         items = given if isinstance(given, tuple) else (given,)
@@ -98,10 +103,24 @@ def require_numbers(value: Any) -> None:
 
 
 @functools.cache
+def _other_arguments(kind: type) -> tuple[str, ...]:
+    """Return what a dataclass takes that is none of its fields: an `InitVar`, or arguments of its own `__init__`."""
+    fields = {field.name for field in dataclasses.fields(kind)}
+    return tuple(name for name in inspect.signature(kind).parameters if name not in fields)
+
+
+def _kept_beside_fields(value: Any) -> list[str]:
+    """Return the names of what a dataclass holds and that is neither a field nor a cached property."""
+    fields = {field.name for field in dataclasses.fields(value)}
+    held = (name for name in getattr(value, "__dict__", {}) if name not in fields)
+    return [name for name in held if not isinstance(getattr(type(value), name, None), functools.cached_property)]
+
+
+@functools.cache
 def _declared(kind: type) -> tuple[tuple[str, str, bool], ...]:
     """Return the names of a dataclass's fields, how they are declared, and whether that is as whole numbers."""
     types = {one.name: one.type for one in dataclasses.fields(kind)}
-    words = {name: one if isinstance(one, str) else formatannotation(one) for name, one in types.items()}
+    words = {name: one if isinstance(one, str) else inspect.formatannotation(one) for name, one in types.items()}
     return tuple((name, word, WHOLE.fullmatch(word) is not None) for name, word in words.items())
 
 
