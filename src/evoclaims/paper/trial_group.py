@@ -77,7 +77,7 @@ def steps_to(source: Source, condition: Condition, curve: str, value: float, lev
 
     # Reports of imported trials are perhaps unevenly far apart, at steps that are no multiples of the longest distance.
     window = Window(budget, float(condition.report_distance), imported, condition.report_steps)
-    return Measure(source, name, read, "lower", window, before=before)
+    return Measure(source, name, read, "lower", window, before=before if window.every else None)
 
 
 def _require_success(label: str, value: float) -> None:
