@@ -75,6 +75,15 @@ def test_every_published_number_is_read_once_from_the_trials_that_it_is_about(re
     assert (reward.numbers.mean, reward.reported.error, reward.repetition.answer) == (9.0, 2.0, Answer.INSIDE)
 
 
+def test_equal_numbers_of_two_measures_are_two_numbers(reporting: Paper) -> None:
+    path = reporting.reproduction.folder / "reported.toml"
+    plots = (f'[plots.small.{name}]\nplace = "x"\nmethods.one.mean = [0.5]' for name in ("reward", "mean_success"))
+    path.write_text(
+        "\n".join(["trials = 10", *plots, '[plots.small.success]\nplace = "x"\nmethods.one.mean = [0.5, 1]'])
+    )
+    assert len(_found(reporting)) == 4
+
+
 def test_a_variant_has_the_numbers_that_it_changes_and_has_run(reporting: Paper) -> None:
     reporting.put("one", "small", HALVED)
     reporting.put("one", "large", [0.9] * 10)

@@ -144,13 +144,16 @@ def _numbers(published: Published) -> Iterator[tuple[str, str, str, int, Reporte
     A number that the file has under two quantities (the last level's, and its own) is yielded once.
     """
     for task, quantities in published.plots.items():
-        seen: dict[tuple[str, Reported], str] = {}
+        seen = set[tuple[str, Reported, bool]]()
         for quantity, plot in quantities.items():
             for method, numbers in plot["methods"].items():
-                for at in range(len(numbers["mean"])):
+                is_curve, last = len(numbers["mean"]) > 1, len(numbers["mean"]) - 1
+                for at in range(last + 1):
                     reported = published.value(task, quantity, method, at)
-                    if reported is not None and seen.setdefault((method, reported), quantity) == quantity:
-                        yield quantity, method, task, at, reported
+                    if reported is None or (at == last and (method, reported, not is_curve) in seen):
+                        continue
+                    seen |= {(method, reported, is_curve)} if at == last else set()
+                    yield quantity, method, task, at, reported
 
 
 def _ours(scope: Scope, quantity: str, method: str, task: str, at: int) -> tuple[TrialNumbers, int | None]:
