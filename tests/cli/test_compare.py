@@ -194,7 +194,7 @@ def test_a_damaged_record_is_said_and_the_rest_is_compared(evoclaims: Evoclaims)
         (("a", "b", "c"), "Two stores can be compared, not 3."),
         (("nothing",), "There is no trial store 'nothing': no folder has this name."),
         (("\x1b[2J",), r"There is no trial store '\x1b[2J'"),
-        (("claims",), "claims is not a trial store: it has no store.json, and a store has no test_claims.py in it."),
+        (("claims",), "claims is not a trial store: it has no store.json, and test_claims.py is in it."),
     ],
 )
 def test_a_users_mistake_is_one_sentence(accepted: Evoclaims, arguments: tuple[str, ...], said: str) -> None:

@@ -1,4 +1,4 @@
-"""A store says that it is one; what does not, and could not have been one before stores said so, is left alone."""
+"""A store says that it is one; what does not is left alone."""
 
 from __future__ import annotations
 
@@ -39,36 +39,11 @@ def test_the_first_file_of_a_store_comes_with_its_mark_and_is_kept_from_git(stor
     store.check()
 
 
-def test_a_store_older_than_the_mark_is_read_and_marked_by_the_next_trial(
-    store: Store, trial: TrialResult, make_result: Make
-) -> None:
-    (store.root / MARK).unlink()
-    (store.root / ".gitignore").unlink()
-    for folder, name in (
-        ("checkpoints", "a" * 64 + "-" + "b" * 16 + ".npz"),
-        ("running", "c" * 64 + ".json"),
-        ("verdicts", "smoke"),
-        ("quarantine", "anything at all"),
-    ):
-        (store.root / folder).mkdir()
-        (store.root / folder / name).touch()
-    store.check()
-    assert store.get(trial.id) is not None
-    store.put(make_result(seed=1), {})
-    assert (store.root / MARK).exists()
-    assert not (store.root / ".gitignore").exists()  # somebody may have committed it
-    store.check()
-
-
 @pytest.mark.parametrize(
     "name",
     [
         "notes.txt",
         "src/program.py",
-        "trials/notes.txt",
-        "champions/2024/photo.jpg",
-        "checkpoints/model.npz",
-        "running/shoes.json",
         "trials",
     ],
 )

@@ -110,16 +110,6 @@ MARK: Final = "store.json"
 SCHEMA: Final = 1
 PROGRAM: Final = "evoclaims"
 
-_FOLDERS: Final = {
-    "trials": r"[0-9a-f]{2}",
-    "champions": r"[0-9a-f]{2}",
-    "checkpoints": r"[0-9a-f]{64}-[0-9a-f]{16}\.npz",
-    "running": r"[0-9a-f]{64}\.json",
-    "verdicts": r".+",
-    "quarantine": r".+",
-}
-"""Folders of a store from before the mark existed, with the pattern of the names in them."""
-
 ELSEWHERE: Final = "name another folder with --claims-storage (pytest) or --storage (evoclaims)."
 """End of the error message when a store cannot be used."""
 
@@ -129,8 +119,7 @@ _OTHER: Final = "Name the folder of a store with --storage (evoclaims) or --clai
 def check_store(root: Path) -> None:
     """Reject an existing folder that is not a store: nothing may be read, written or moved in it.
 
-    A folder is a store if it has the mark, is empty, or contains only what a release without the mark could have
-    written.
+    A folder is a store if it has the mark, and may become one if it is empty but for hidden files.
 
     Raises:
         UserError: when it is something else, cannot be read, or is of a later release.
@@ -148,29 +137,25 @@ def check_store(root: Path) -> None:
     if MARK in names:
         _check_mark(root / MARK)
         return
-    strange = _strange(root, names)
-    if strange:
+    held = sorted((name for name in names if not name.startswith(".")), key=lambda name: (name == "__pycache__", name))
+    if held:
         raise UserError(
-            f"{root} is not a trial store: it has no {MARK}, and a store has no {strange} in it. Nothing "
-            f"in it was changed. {_OTHER}. A new store needs a folder that is empty or does not exist."
+            f"{root} is not a trial store: it has no {MARK}, and {held[0]} is in it. Nothing in it was changed. "
+            f"{_OTHER}. A new store needs a folder that is empty or does not exist."
         )
 
 
 def mark(root: Path) -> None:
     """Mark a folder as a store, and make git ignore its contents.
 
-    An older store without a mark gets no `.gitignore`: its files may have been committed.
-
     Raises:
         UserError: when the folder cannot be written or the disk is full.
     """
     if os.path.lexists(root / MARK):
         return
-    begins = not any((root / name).exists() for name in _FOLDERS)
     text = json.dumps({"program": PROGRAM, "schema": SCHEMA, "content": "trials of claims; see `evoclaims --help`"})
     write_once(root / MARK, f"{text}\n".encode(), ELSEWHERE)
-    if begins:
-        write_once(root / ".gitignore", b"*\n", ELSEWHERE)
+    write_once(root / ".gitignore", b"*\n", ELSEWHERE)
 
 
 def _check_mark(path: Path) -> None:
@@ -188,21 +173,3 @@ def _check_mark(path: Path) -> None:
             f"{path} has schema {plain.get('schema')!r}, and this version of evoclaims reads schema "
             f"{SCHEMA}. Use a later version of evoclaims, or another folder."
         )
-
-
-def _strange(root: Path, names: list[str]) -> str:
-    """Return the first name in an unmarked folder that no store has, Python's own names last; empty if none."""
-    for name in sorted(names, key=lambda name: (name == "__pycache__", name)):
-        if name.startswith("."):
-            continue
-        pattern = _FOLDERS.get(name)
-        if pattern is None or not (root / name).is_dir():
-            return name
-        try:
-            inside = sorted(os.listdir(root / name))
-        except OSError:
-            continue  # an unreadable part of a store is reported where it is read
-        for entry in inside:
-            if not entry.startswith(".") and not re.fullmatch(pattern, entry):
-                return f"{name}/{entry}"
-    return ""
