@@ -44,7 +44,8 @@ def interrupted(tmp_path_factory: pytest.TempPathFactory, cpus: list[Any]) -> Pa
 @pytest.fixture
 def path(interrupted: Path, store: Store) -> Path:
     """The place of this checkpoint in another store, where it lies, too."""
-    store.checkpoints.mkdir(parents=True)
+    store.check_writable()
+    store.checkpoints.mkdir()
     return Path(shutil.copy(interrupted, store.checkpoints))
 
 
@@ -90,7 +91,7 @@ def test_a_bad_checkpoint_is_named_and_moved_aside_by_verify(kind: str, path: Pa
         checkpoint.find(store.checkpoints, CONDITION.id, "any")
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)
-    (problem,) = verify(store, repair=True, checkpoint_fault=fault)
+    (problem,) = verify(store, repair=True)
     assert (problem.kind, problem.path) == ("checkpoint", path)
     assert checkpoint.find(store.checkpoints, CONDITION.id, "any") == []
 
@@ -115,7 +116,8 @@ def test_a_checkpoint_of_a_later_format_is_passed_over_and_reported(path: Path, 
 
 def test_the_checkpoint_of_another_condition_stops_nothing(store: Store, cpus: list[Any]) -> None:
     other = store.checkpoints / f"{'0' * 64}-{'0' * 16}.npz"
-    store.checkpoints.mkdir(parents=True)
+    store.check_writable()
+    store.checkpoints.mkdir()
     other.write_bytes(b"torn")
     assert len(run(CONDITION, [1], store, cpus)) == 1
 
@@ -124,7 +126,7 @@ def test_the_checkpoint_of_another_condition_stops_nothing(store: Store, cpus: l
 @given(st.data())
 def test_no_byte_changed_in_a_checkpoint_goes_unnoticed_or_leads_astray(data: st.DataObject) -> None:
     """Either the damage is seen, or it hit a byte that carries nothing (as some of a zip's do)."""
-    header = checkpoint.Header("0" * 64, "p", [3], [3], 2, {"3": {"steps": [1.0]}}, 0.5, 0.5, "now")
+    header = checkpoint.Header("0" * 64, "p", [3], [3], 2, {"3": {"steps": [1.0]}}, 0.5, 0.5, "now", "")
     with tempfile.TemporaryDirectory() as folder:
         path = checkpoint.path_of(Path(folder), header)
         checkpoint.save(Path(folder), header, np.arange(5.0))  # type: ignore[arg-type]
@@ -232,7 +234,7 @@ def test_a_bomb_takes_no_memory_and_is_named(
     with pytest.raises(DamagedFileError, match=f"readable checkpoint; run `evoclaims verify --storage {store.root}`"):
         run(CONDITION, [1, 5], store, cpus)
     assert memory() < BOUND
-    (problem,) = verify(store, repair=True, checkpoint_fault=checkpoint.fault)
+    (problem,) = verify(store, repair=True)
     assert (problem.kind, problem.path) == ("checkpoint", path)
     assert memory() < BOUND
 

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import math
 import signal
 import threading
 import weakref
 from collections.abc import Callable
 from contextlib import nullcontext, suppress
-from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from climbers import CLIMBING, SEEDS, Log, digests, run_climbers
 from hypothesis import given
@@ -21,7 +18,6 @@ from hypothesis import strategies as st
 from evoclaims.core import waiting
 from evoclaims.core.errors import UserError
 from evoclaims.trials import stopping as allowances
-from evoclaims.trials.arrays import pack, unpack
 from evoclaims.trials.batches import StoredTrials
 from evoclaims.trials.failed import DEFAULT_LIMIT, answers, is_final, seconds_of
 from evoclaims.trials.progress import RunProgress
@@ -104,9 +100,8 @@ def test_on_request_it_has_as_much_time_again(
     assert digests(_run(store, cpus, 4.0)) == digests(uninterrupted)
 
 
-@pytest.mark.parametrize("old", [False, True])
 def test_a_batch_that_is_interrupted_again_and_again_has_no_more_time_than_one_that_is_not(
-    counted: None, store: Store, cpus: list[Any], old: bool
+    counted: None, store: Store, cpus: list[Any]
 ) -> None:
     def interrupted(progress: RunProgress) -> None:
         if progress.phase == "training":
@@ -117,18 +112,8 @@ def test_a_batch_that_is_interrupted_again_and_again_has_no_more_time_than_one_t
         runs += 1
         with suppress(KeyboardInterrupt):  # each run takes two: to begin, and for a call of the device
             results = run(CLIMBING, SEEDS, store, cpus, interrupted, 0.0, time_limit=7.0)
-        for path in store.checkpoints.iterdir() if old else ():
-            without_time_spent(path)
-    assert ("timeout" in {result.status for result in results}) is not old
-    assert (runs > 4) is old
-
-
-def without_time_spent(path: Path) -> None:
-    """Make a checkpoint one of a release that does not note there what a batch has taken of its time."""
-    arrays = unpack(path.read_bytes())
-    header = json.loads(arrays["header"].tobytes())
-    del header["spent_seconds"]
-    path.write_bytes(pack({**arrays, "header": np.frombuffer(json.dumps(header).encode(), np.uint8)}))
+    assert "timeout" in {result.status for result in results}
+    assert runs <= 4
 
 
 def test_a_batch_that_had_no_time_to_begin_is_stored_without_a_curve(

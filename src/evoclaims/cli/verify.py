@@ -6,7 +6,6 @@ Files of verdicts are not read: nothing is judged from them, and each run with t
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from evoclaims.cli.store_folder import open_store
 from evoclaims.trials.integrity import verify
@@ -15,15 +14,8 @@ from evoclaims.trials.integrity import verify
 def main(options: argparse.Namespace) -> int:
     """List problems and move bad files aside; 1 when there were any."""
     store = open_store(options.storage)
-    problems = verify(store, repair=not options.dry_run, checkpoint_fault=_fault)
+    problems = verify(store, repair=not options.dry_run)
     for problem in problems:
         print(problem)
     print(f"{len(store.ids())} trials in {store.root}, {len(problems)} problems")
     return int(bool(problems))
-
-
-def _fault(path: Path) -> str | None:
-    """Return what is wrong with a checkpoint, if anything; only where there is one, the import of jax is waited for."""
-    from evoclaims.trials.checkpoint import fault
-
-    return fault(path)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections import Counter
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -91,15 +91,9 @@ def _training(trial: TrialResult) -> Hashable | None:
         return (repr(sorted(trial.metrics.items())), trial.curves_hash) if len(long) >= MOST_BY_CHANCE else None
     if TRAINED_BY not in trial.provenance or trial.status not in COMPLETE or not trial.digest:  # a pilot has no digest
         return None
-    returned = trial.provenance.get(RETURNED)
-    if not isinstance(returned, Mapping):  # a record of an earlier release: its metrics may be those of an examination
-        examined = trial.provenance.get("scored_by") != "training function"
-        metrics = "" if examined else repr(sorted(trial.metrics.items()))
-        returned = {"metrics": metrics, "actions": "", "graded": False}
-        if examined and not trial.curves:
-            return None
-    telling = bool(returned.get("graded")) or _is_telling(itertools.chain.from_iterable(trial.curves.values()))
-    return trial.curves_hash, returned.get("actions"), None if telling else returned.get("metrics")
+    returned = trial.provenance[RETURNED]
+    telling = returned["graded"] or _is_telling(itertools.chain.from_iterable(trial.curves.values()))
+    return trial.curves_hash, returned["actions"], None if telling else returned["metrics"]
 
 
 def _is_telling(numbers: Iterable[float]) -> bool:

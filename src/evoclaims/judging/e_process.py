@@ -36,6 +36,9 @@ SHIFTS: Final = np.array([-1.2, -0.8, -0.5, -0.3, 0.3, 0.5, 0.8, 1.2])
 LARGEST: Final = 230.0
 """Logarithm at which evidence is cut, which makes it smaller at most."""
 
+DRAWS: Final = 99
+"""Simulations of which the median is taken."""
+
 
 def standardized_ranks(values: Floats) -> Floats:
     """Return mid-ranks with mean 0 and variance 1, shape [n]; zeros where all values are equal."""
@@ -122,7 +125,7 @@ def _log_power(times: int, share: float) -> float:
     return times * math.log(share) if times else 0.0
 
 
-def nights_to_find(before: int, each: int, shift: float, level: float, most: int = 10, draws: int = 99) -> int:
+def nights_to_find(before: int, each: int, shift: float, level: float, most: int = 10) -> int:
     """Return the median number of nights after which normal trials that moved by `shift` SD reach `level`.
 
     Simulated with a fixed seed; `most` + 1 if the median is later.
@@ -133,12 +136,11 @@ def nights_to_find(before: int, each: int, shift: float, level: float, most: int
         shift: of every trial, in standard deviations.
         level: of the evidence.
         most: nights that are simulated.
-        draws: simulations.
     """
     rng = np.random.default_rng(20251126)
-    scores = rng.normal(size=(draws, before + most * each))
+    scores = rng.normal(size=(DRAWS, before + most * each))
     scores[:, before:] += shift
-    p = ranks_of_new(scores, rng.random((draws, most * each)))
+    p = ranks_of_new(scores, rng.random((DRAWS, most * each)))
     reached = evidence(p, before, [each] * most) >= level
     first = np.where(reached.any(axis=1), reached.argmax(axis=1) + 1, most + 1)
     return int(np.median(first))

@@ -184,7 +184,7 @@ def drop_finished_checkpoints(stored: StoredTrials) -> None:
     of_these_versions = replace(stored, any_version=False)
     folder, here = stored.store.checkpoints, short_hash(stored.condition.versions)
     for header in checkpoint.sound_ones(folder, stored.condition.id):
-        if header.versions in ("", here) and all(map(is_stored, header.seeds)):
+        if header.versions == here and all(map(is_stored, header.seeds)):
             checkpoint.remove(folder, header)
 
 

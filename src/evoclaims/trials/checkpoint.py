@@ -42,12 +42,12 @@ class Header:
         chunks: whole chunks of the budget done; the state may be further.
         curves: for each seed (as text), the points of its training curve so far, by name.
         run_seconds: spent on running so far.
-        processor_seconds: of processors' cores that running has taken so far; counted from 0 on by old checkpoints.
+        processor_seconds: of processors' cores that running has taken so far.
         compile_seconds: spent on compiling by all processes that ran the batch.
         started: when the batch began (UTC, ISO 8601).
-        versions: hash of the versions that the condition depends on (`packages.short_hash`); empty in old checkpoints.
+        versions: hash of the versions that the condition depends on (`packages.short_hash`).
         schema: version of this format.
-        spent_seconds: of the time that a batch may take, so far; not counted in old checkpoints, nor without a limit.
+        spent_seconds: of the time that a batch may take, so far; not counted without a limit.
     """
 
     condition: str
@@ -59,7 +59,7 @@ class Header:
     run_seconds: float
     compile_seconds: float
     started: str
-    versions: str = ""
+    versions: str
     schema: int = SCHEMA
     processor_seconds: float = 0.0
     spent_seconds: float = 0.0

@@ -7,7 +7,7 @@ import itertools
 import os
 import re
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Literal
@@ -49,15 +49,12 @@ class Problem:
         return printable(f"{self.kind} {self.path}: {self.reason}{moved}")
 
 
-def verify(
-    store: Store, repair: bool, checkpoint_fault: Callable[[Path], str | None] = lambda path: None
-) -> list[Problem]:
+def verify(store: Store, repair: bool) -> list[Problem]:
     """Read everything in `store` and list the problems.
 
     Args:
         store: the store; one that does not exist yet has no problems.
         repair: move listed files, except those of a later release, into `<root>/quarantine/`; nothing is ever deleted.
-        checkpoint_fault: says what is wrong with a checkpoint file, or None when it can be resumed.
 
     Returns:
         One problem per file, records first.
@@ -66,7 +63,7 @@ def verify(
         UserError: when the folder is not a store (nothing is moved then), or a bad file cannot be moved.
     """
     store.check()
-    checks = (_records(store), _champions(store), _checkpoints(store, checkpoint_fault), _leftovers(store))
+    checks = (_records(store), _champions(store), _checkpoints(store), _leftovers(store))
     found: dict[Path, Problem] = {}
     for problem in itertools.chain.from_iterable(checks):
         found.setdefault(problem.path, problem)
@@ -128,11 +125,12 @@ def _champions(store: Store) -> Iterator[Problem]:
             yield Problem(path, "leftover", "no record of its trial names it")
 
 
-def _checkpoints(store: Store, fault: Callable[[Path], str | None]) -> Iterator[Problem]:
+def _checkpoints(store: Store) -> Iterator[Problem]:
     for path in sorted(store.checkpoints.rglob("*")):
         if path.is_file() and not path.name.startswith("."):
-            reason = fault(path)
-            if reason is not None:
+            from evoclaims.trials.checkpoint import fault  # it imports jax
+
+            if (reason := fault(path)) is not None:
                 yield Problem(path, "checkpoint", printable(reason))
 
 

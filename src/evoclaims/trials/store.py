@@ -1,7 +1,7 @@
 """The trial store: sealed JSON files named by content hashes, and champions beside them.
 
 A trial has one record for each set of versions that it was run with: `trials/ab/<id>.<hash>.json`, whose hash is of the
-versions that its condition depends on. Records of older releases, which do not say what they depend on, are
+versions that its condition depends on. Records that do not say what they depend on, as some committed ones, are
 `trials/ab/<id>.json`.
 
 No locks and no server: files are complete or absent, and a file's name follows from its contents. So several processes
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from evoclaims.core.errors import StorageError
 from evoclaims.core.files import read_file, write_atomically, write_once
-from evoclaims.core.packages import Versions, agree, depends_on, recorded, without_flags
+from evoclaims.core.packages import Versions, agree, depends_on, recorded
 from evoclaims.trials.arrays import pack, unpack
 from evoclaims.trials.failed import time_allowed
 from evoclaims.trials.result import COMPLETE, TrialResult, matches_digest
@@ -161,9 +161,7 @@ class Store(StoreFiles):
             raise DamagedFileError(path, error.reason, later=error.later) from error
         if result.id != trial_id:
             raise DamagedFileError(path, f"it holds another trial, {result.id}")
-        versions = _versions(result)
-        plain = f"{trial_id}.json" if versions is None else self.record_path(trial_id, without_flags(versions)).name
-        if path.name not in (f"{trial_id}.json", plain, self.home(result).name):  # once, no name had flags
+        if path.name not in (f"{trial_id}.json", self.home(result).name):
             raise DamagedFileError(path, "its name is not that of the versions that it was made with")
         return result
 
