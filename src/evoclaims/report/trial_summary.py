@@ -43,17 +43,16 @@ class Origin:
     @staticmethod
     def of(provenance: Mapping[str, Any]) -> Origin:
         """Read a record's provenance."""
-        device, git = _mapping(provenance.get("device")), _mapping(provenance.get("git"))
+        device, git = provenance.get("device") or {}, provenance.get("git") or {}
         kind, platform = clean(device.get("kind") or ""), clean(device.get("platform") or "")
         known = " ".join([kind, f"({platform})" if platform not in ("", kind) else ""]).strip()
-        dirty = git.get("dirty")
         rest = provenance.keys() - {"device", "git", "machine", "versions", "seed_in_table", DEPENDS_ON}
         return Origin(
-            device=known or _imported(_mapping(provenance.get("imported"))) or "unknown device",
+            device=known or _imported(provenance.get("imported") or {}) or "unknown device",
             machine=clean(provenance.get("machine") or "unknown machine"),
             revision=clean(git.get("sha") or ""),
-            dirty=dirty if isinstance(dirty, bool) else None,
-            versions=_pairs(_mapping(provenance.get("versions"))),
+            dirty=git.get("dirty"),
+            versions=_pairs(provenance.get("versions") or {}),
             settings=_pairs({name: provenance[name] for name in sorted(rest)}),
         )
 
@@ -85,11 +84,6 @@ def _imported(table: Mapping[str, Any]) -> str:
         return ""
     digits = str(table.get("sha256", ""))[:SHORT]
     return clean(f"an unknown device (imported from {table.get('file')}, sha256 {digits}, by {table.get('by')})")
-
-
-def _mapping(value: object) -> Mapping[str, Any]:
-    """Return a JSON object; an empty one for anything else."""
-    return value if isinstance(value, dict) else {}
 
 
 def _pairs(values: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:

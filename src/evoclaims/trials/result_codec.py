@@ -119,6 +119,7 @@ class Provenance(Struct):
     code_hashes: dict[str, str] | None = None
     cuda: dict[str, str] | None = None
     device: Device | None = None
+    imported: Table | None = None
     machine: str | None = None
     instructions: str | None = None
     xla_flags: str | None = None
