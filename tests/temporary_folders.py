@@ -39,7 +39,7 @@ def temporary_folder(prefix: str = PREFIX) -> Path:
 def _remove_unless_held(path: Path) -> None:
     """Remove the folder of a lock that nobody holds; raise an `OSError` where it is held, or another user's."""
     status = path.lstat()
-    if hasattr(os, "getuid") and status.st_uid != os.getuid():
+    if status.st_uid != os.getuid():
         return
     if time.time() - status.st_mtime > SETTLED_SECONDS:
         with FileLock(path, timeout=0):

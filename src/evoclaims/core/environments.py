@@ -135,7 +135,7 @@ class Environment:
     @property
     def python(self) -> Path:
         """Its interpreter."""
-        return _place(self.folder, "scripts") / ("python.exe" if os.name == "nt" else "python")
+        return _place(self.folder, "scripts") / "python"
 
     def moved(self, package: str) -> dict[str, tuple[str | None, str]]:
         """Return what else than a package has another version here, by name: ours and its own."""
@@ -275,7 +275,7 @@ def _made(recipe: Recipe, empty: Environment, project: Path, pins: str) -> Envir
 
 def _begin_layer(folder: Path) -> None:
     """Make an environment that finds first what is installed in it, and then what is installed here."""
-    venv.EnvBuilder(symlinks=os.name != "nt", with_pip=importlib.util.find_spec("pip") is None).create(folder)
+    venv.EnvBuilder(symlinks=True, with_pip=importlib.util.find_spec("pip") is None).create(folder)
     bases = [path for path in sys.path if Path(path).name in ("site-packages", "dist-packages")]
     lines = [f"import site; site.addsitedir({base!r})\n" for base in bases]
     (_place(folder, "purelib") / "layer.pth").write_text("".join(lines), encoding="utf-8")

@@ -28,7 +28,7 @@ ELSEWHERE: Final = "name another folder."
 MOST_BYTES: Final = 2**31
 """Of a file that is read as a whole: a larger one, such as one of holes alone, would take the memory."""
 
-_FULL: Final = (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC))
+_FULL: Final = (errno.ENOSPC, errno.EDQUOT)
 """Errors of a disk or a quota that is full, where there is another way out."""
 
 
@@ -39,7 +39,7 @@ def open_file(path: Path) -> BinaryIO:
         OSError: when it is missing or unreadable; when it is a folder, or a pipe or device, which could block the
             reader forever.
     """
-    descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
     mode = os.fstat(descriptor).st_mode
     if not stat.S_ISREG(mode):
         os.close(descriptor)
@@ -113,7 +113,7 @@ def write_once(path: Path, data: bytes, elsewhere: str = ELSEWHERE) -> bool:
 
 def at_once(path: str, flags: int) -> int:
     """Open a file for writing: an `opener` of `open`, by which a pipe that nobody reads is an error and no wait."""
-    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0), 0o666)
+    return os.open(path, flags | os.O_NONBLOCK, 0o666)
 
 
 def write_where_named(path: Path, data: bytes, elsewhere: str = ELSEWHERE) -> None:
@@ -131,11 +131,9 @@ def write_where_named(path: Path, data: bytes, elsewhere: str = ELSEWHERE) -> No
     if is_file:
         write_atomically(Path(os.path.realpath(path)) if os.path.islink(path) else path, data, elsewhere)
         return
-    unblocked = getattr(os, "O_NONBLOCK", 0)
     try:
-        with open(os.open(path, os.O_WRONLY | unblocked), "wb") as file:
-            if unblocked:
-                os.set_blocking(file.fileno(), True)
+        with open(os.open(path, os.O_WRONLY | os.O_NONBLOCK), "wb") as file:
+            os.set_blocking(file.fileno(), True)
             file.write(data)
     except OSError as error:
         raise _unwritten(path, error, elsewhere) from error
@@ -216,7 +214,7 @@ def doubt(folder: Path) -> str:
     for above in Path(os.path.realpath(folder)).parents:
         mode = os.stat(above).st_mode
         # Everybody could rename what is in it, and put another folder into its place; not with the sticky bit of /tmp.
-        if mode & stat.S_IWOTH and not mode & stat.S_ISVTX and hasattr(os, "getuid"):
+        if mode & stat.S_IWOTH and not mode & stat.S_ISVTX:
             return f"{above} is writable by all users"
     return ""
 
@@ -247,8 +245,6 @@ def say_refused(path: Path, why: str) -> None:
 
 def _doubt(status: os.stat_result) -> str:
     """Return a clause that says why other users may have written a file or folder."""
-    if not hasattr(os, "getuid"):  # Windows has access lists instead
-        return ""
     if status.st_uid not in (0, os.getuid()):
         return f"belongs to another user (uid {status.st_uid})"
     if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):

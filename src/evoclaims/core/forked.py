@@ -38,7 +38,6 @@ def _note() -> None:
     _forked_with_jax = _forked_with_jax or _jax_runs()
 
 
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_note)
+os.register_at_fork(after_in_child=_note)
 with suppress(OSError):  # imported after the fork: jax's threads would be among those of the process
     _forked_with_jax = _jax_runs() and len(os.listdir("/proc/self/task")) == 1
