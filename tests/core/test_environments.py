@@ -7,7 +7,9 @@ import os
 import shutil
 import subprocess
 import sys
+import venv
 from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -188,6 +190,16 @@ def test_releases_are_listed_oldest_first_and_final_ones_alone(wheels: Path) -> 
         released("gravel")
     with pytest.raises(UserError, match=r"1\.10 is not older than 1\.9"):
         between("1.10", "1.9", [])
+
+
+def test_releases_are_listed_in_an_environment_without_pip_as_uv_makes_it(
+    wheels: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_wheel(wheels, "pebble", "1.1", "")
+    venv.create(tmp_path / "bare", symlinks=True)
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "bare" / "bin" / "python"))
+    monkeypatch.setattr("importlib.util.find_spec", lambda name, find=find_spec: None if name == "pip" else find(name))
+    assert released("pebble") == ["1.1"]
     with pytest.raises(UserError, match="'new' is not a version"):
         checked("new")
 

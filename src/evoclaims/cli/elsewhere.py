@@ -21,7 +21,16 @@ from evoclaims.claims.claim_names import selected
 from evoclaims.cli.project import open_project
 from evoclaims.cli.store_folder import open_store
 from evoclaims.cli.terminal import terminal
-from evoclaims.core.environments import PIP, Environment, NotInstallableError, Recipe, ending, folder_of, make, reason
+from evoclaims.core.environments import (
+    Environment,
+    NotInstallableError,
+    Recipe,
+    ending,
+    folder_of,
+    make,
+    pip_here,
+    reason,
+)
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.files import at_once, read_json
 from evoclaims.core.printable import printable
@@ -226,7 +235,7 @@ def released(package: str) -> list[str]:
     Raises:
         UserError: when pip finds none.
     """
-    command = [sys.executable, *PIP, "index", "versions", package]
+    command = [sys.executable, *pip_here(), "index", "versions", package]
     done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
     listed = re.search(r"^Available versions: (.*)$", done.stdout, re.MULTILINE)
     if listed is None:

@@ -66,6 +66,15 @@ COMPLETE: Final = "complete.json"
 
 PIP: Final = ("-m", "pip", "--disable-pip-version-check", "--no-input")
 
+
+def pip_here() -> tuple[str, ...]:
+    """Return `PIP` for this Python; without pip, as in an environment of uv, the one that Python brings for its own."""
+    if importlib.util.find_spec("pip") is None and (brings := importlib.util.find_spec("ensurepip")):
+        for wheel in (Path(brings.origin or "").parent / "_bundled").glob("pip-*.whl"):
+            return (str(wheel / "pip"), *PIP[2:])
+    return PIP
+
+
 _LIST: Final = (
     "import importlib.metadata as m, json; "
     "print(json.dumps({d.name: d.version for d in [*m.distributions()][::-1] if d.name}))"
