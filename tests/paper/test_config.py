@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from evoclaims.core.errors import UserError
+from evoclaims.judging.design import Design
 from evoclaims.paper.config import SuiteConfig, find_root, load_config, load_reproduction
 from evoclaims.paper.reproduction import Reproduction, Tier
 
@@ -100,6 +101,12 @@ def test_a_module_that_is_not_there_is_a_sentence(project: Path, name: str) -> N
     with pytest.raises(UserError, match=f"There is no module '{name}'") as caught:
         load_reproduction(SuiteConfig(project, name))
     _sentence(caught)
+
+
+def test_a_file_in_the_place_of_a_module_is_told_the_module(project: Path) -> None:
+    (project / "a_tiny_paper_in_a_file.py").write_text(MODULE)
+    with pytest.raises(UserError, match=r"'a_tiny_paper_in_a_file' is no package: write 'a_tiny_paper_in_a_file'\."):
+        load_reproduction(SuiteConfig(project, "a_tiny_paper_in_a_file.py"))
 
 
 @pytest.mark.parametrize(
@@ -197,7 +204,7 @@ def test_a_batch_may_take_what_the_option_says_or_else_the_table(
 
 def test_a_time_limit_that_is_no_time_is_a_sentence(project: Path) -> None:
     (project / "pyproject.toml").write_text(TABLE + 'time_limit = "soon"\n')
-    with pytest.raises(UserError, match="A time limit is a length of time") as caught:
+    with pytest.raises(UserError, match=r"pyproject.toml has time_limit = .* is a length of time") as caught:
         load_config(project).seconds(None)
     assert "'soon'" in _sentence(caught)
 
@@ -209,3 +216,8 @@ def test_a_reproduction_with_text_for_a_folder_or_a_number_for_a_design_is_refus
         UserError, match=r"A tier has design=10, which is not a Design\. Write Tier\(conditions, Design\.fixed\(10\)\)"
     ):
         Tier({}, 10)  # type: ignore[arg-type]
+    for names in ("a_method", ("a_method",), ("a_method", 3)):
+        with pytest.raises(UserError, match=r"A tier has a condition named .*\. Name a method and a task"):
+            Tier({names: None}, Design.fixed(10))  # type: ignore[dict-item]
+    with pytest.raises(UserError, match=r"A tier has None for a_method on a_task\. Write a Condition"):
+        Tier({("a_method", "a_task"): None}, Design.fixed(10))  # type: ignore[dict-item]

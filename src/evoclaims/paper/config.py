@@ -44,8 +44,10 @@ def import_module(name: str, root: Path, named_by: str) -> ModuleType:
 
 
 def _meant(lacking: str, root: Path) -> str:
-    """Return which modules are beside one that is not there, and the one that it resembles; nothing without any."""
+    """Return which modules are beside one that is not there, and the one that it resembles or is a file of."""
     package = lacking.rpartition(".")[0]
+    if package in sys.modules and not hasattr(sys.modules[package], "__path__"):
+        return f" {package!r} is no package: write {package!r}."
     folders = list(getattr(sys.modules.get(package), "__path__", ())) if package else [str(root)]
     beside = [f"{package}.{one.name}".removeprefix(".") for one in pkgutil.iter_modules(folders)]
     return guess(lacking, beside) if beside else ""
@@ -75,7 +77,12 @@ class SuiteConfig:
         Raises:
             UserError: when that is not a length of time.
         """
-        return seconds_of(self.time_limit if option is None else option)
+        if option is not None:
+            return seconds_of(option)
+        try:
+            return seconds_of(self.time_limit)
+        except UserError as error:
+            raise UserError(f"{self.root / 'pyproject.toml'} has time_limit = {self.time_limit!r}. {error}") from error
 
 
 def find_root(start: Path) -> Path:

@@ -116,12 +116,22 @@ class Tier:
     others: Mapping[str, Collection[Names]] = field(default_factory=dict, kw_only=True, compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Reject a number of trials in the place of the design, and trials for drift that nothing could compare."""
+        """Reject what is no design, name or condition, and trials for drift that nothing could compare."""
         if not isinstance(self.design, Design):
             raise UserError(
                 f"A tier has design={self.design!r}, which is not a Design. Write Tier(conditions, Design.fixed(10)) "
                 "for ten trials."
             )
+        for key, condition in self.conditions.items():
+            if not isinstance(key, tuple) or len(key) != 2 or not all(isinstance(name, str) for name in key):
+                raise UserError(
+                    f"A tier has a condition named {key!r}. Name a method and a task, as in "
+                    '{("hill_climber", "majority"): Condition(...)}.'
+                )
+            if not isinstance(condition, Condition | Imported):
+                raise UserError(
+                    f"A tier has {condition!r} for {' on '.join(key)}. Write a Condition(...), or Imported(...)."
+                )
         for names, more in self.for_drift.items():
             self.condition(*names)
             if not 1 <= more <= MAX_TRIALS - self.design.last.n:
