@@ -93,6 +93,14 @@ def test_a_file_without_names_or_with_doubt_is_refused(
         values(text, f"runs.{ending}")
 
 
+@pytest.mark.parametrize("text", ["seed,r\xfcckgabe\n1,2\n", "seed,return\n1,\xfc\n"])
+def test_a_table_in_latin_1_is_told_to_become_utf_8_where_its_letters_matter(
+    values: Callable[..., list[float]], text: str
+) -> None:
+    with pytest.raises(UserError, match=r"is not UTF-8 text: save it as UTF-8"):
+        values(text.encode("latin-1"), "runs.csv")
+
+
 def test_a_frame_without_columns_is_a_table_without_columns(values: Callable[..., list[float]]) -> None:
     with pytest.raises(UserError, match="runs.json is a table without columns"):
         values(pd.DataFrame().to_json(orient="split"), "runs.json")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -40,11 +40,18 @@ class TableFile:
         Raises:
             UserError: when no column has this name, or two have it, or it cannot be read.
         """
+        if name not in self.columns.names:
+            self._require_text(self.columns.names)
         require_known(f"column in {self.name} ({role})", name, self.columns.names)
         try:
             return self.columns.cells(name)
         except NoTableError as error:
             raise UserError(f"{self.name} is not a table that can be read: {error}.") from error
+
+    def _require_text(self, texts: Iterable[str]) -> None:
+        """Check names or cells that are not as asked for: other bytes than UTF-8 may be why."""
+        if any("\udc80" <= letter <= "\udcff" for text in texts for letter in text):
+            raise UserError(f"{self.name} is not UTF-8 text: save it as UTF-8.")
 
     def rows_where(self, where: Mapping[str, object]) -> list[int]:
         """Return the rows, counted from 0, that have these values in these columns.
@@ -57,6 +64,7 @@ class TableFile:
             held = self._rows_by_cell(name)
             found = {row for cell, at in held.values() if _is(cell, value) for row in at}
             if not found:
+                self._require_text(text for _, text in held)
                 known = guess(value, {text for _, text in held}) if len(held) <= MOST_LISTED else ""
                 raise UserError(f"{self.name} has no row whose {name} is {value!r}.{known}")
             rows = sorted(found.intersection(rows))
@@ -100,6 +108,7 @@ class TableFile:
                 return number
         except (TypeError, ValueError, OverflowError):
             pass
+        self._require_text([str(cell)])
         raise UserError(f"{self.name} holds {cell!r} in row {row + 1} of the column {name!r}, which is not a number.")
 
 
