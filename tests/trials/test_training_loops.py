@@ -143,7 +143,10 @@ def test_what_a_loop_does_in_an_odd_way_is_understood_or_is_a_crash_that_says_wh
     too_far, long, unnamed, reading, loud = map(failed.why, crashed)
     assert too_far.endswith(f"A training function reports {2**60} steps. Report a number from 0 to {2**53}.")
     assert long == "ValueError: " + "x" * 488
-    assert unnamed.endswith(r"'a name that is no \udc80 text' is 1.0.")
+    assert unnamed == r"A training loop's metrics are numbers by name, and 'a name that is no \udc80 text' is 1.0."
+    told = crashed[0].provenance["crash"]
+    assert "in in_odd_ways" in told
+    assert "loop_process.py" not in told
     assert reading == "EOFError: EOF when reading a line"
     assert loud == "its process ended with status 3"
     assert crashed[-1].provenance["crash"].endswith("the end\nits process ended with status 3")

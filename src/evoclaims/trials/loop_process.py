@@ -17,6 +17,7 @@ import time
 import traceback
 from collections.abc import Callable, Iterable, Mapping
 from numbers import Real
+from pathlib import Path
 from typing import Any, Final
 
 import msgspec
@@ -251,9 +252,18 @@ def main() -> None:
     try:
         answer(train(request, answer))
     except BaseException as error:
-        answer(Failed(last_lines("".join(traceback.format_exception(error)))))
+        answer(Failed(last_lines(_told(error))))
         os._exit(1)
     os._exit(0)  # threads of the function do not keep the process
+
+
+def _told(error: BaseException) -> str:
+    """Return an exception with its traceback; of a user's error the message, after the lines of the user's own code."""
+    if not isinstance(error, UserError):
+        return "".join(traceback.format_exception(error))
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [frame for frame in frames if not Path(frame.filename).is_relative_to(Path(__file__).parents[1])]
+    return "".join(traceback.format_list(own)) + str(error)
 
 
 def _requests() -> io.BufferedReader:
