@@ -64,7 +64,10 @@ BOX: dict[str, Any] = {"centre": (0.0, 0.0), "half_size": (1.0, 1.0)}
         ),
         *(
             (partial(Rangefinders, **numbers), "at least 1 ray, and a finite reach above 0")
-            for numbers in ({"count": 0}, *({"reach": wrong} for wrong in (0.0, math.inf, math.nan)))
+            for numbers in (
+                *({"count": wrong} for wrong in (0, 2.5, "7")),
+                *({"reach": wrong} for wrong in (0.0, math.inf, math.nan, "4")),
+            )
         ),
     ],
 )

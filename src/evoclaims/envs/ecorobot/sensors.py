@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from numbers import Real
 from typing import Final, Protocol
 
 import jax.numpy as jnp
@@ -39,9 +40,10 @@ class Rangefinders:
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        if self.count < 1 or not 0 < self.reach < math.inf:
+        numbers = isinstance(self.count, int | np.integer) and isinstance(self.reach, Real)
+        if not numbers or self.count < 1 or not 0 < self.reach < math.inf:
             raise UserError(
-                f"A sensor has count={self.count} and reach={self.reach}. Write at least 1 ray, and a finite reach "
+                f"A sensor has count={self.count!r} and reach={self.reach!r}. Write at least 1 ray, and a finite reach "
                 "above 0, in m."
             )
 
