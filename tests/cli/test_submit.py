@@ -186,7 +186,7 @@ def test_jobs_of_this_machine_are_estimated_on_its_gpus(evoclaims: Evoclaims, mo
     ("arguments", "sentence"),
     [
         (["--cluster=cloud"], "cluster"),
-        (["--time=soon"], "A time limit is a length of time"),
+        (["--time=soon"], "A job's time is a length of time such as 2:00:00 or 2h, not 'soon'"),
         (["--time=0"], "A job's time must be above 0, not '0'."),
         (["--gpus=-1"], "--gpus takes a number from 0 up, not -1."),
         (["--cpus=-1", "--dry-run"], "--cpus takes a number from 0 up, not -1."),

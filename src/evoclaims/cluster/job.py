@@ -137,9 +137,12 @@ def minutes_of(text: str) -> int:
     """
     found = re.fullmatch(r"(?:(\d{1,4})-)?(\d{1,5})(?::(\d{1,2}))?(?::(\d{1,2}))?", text.strip(), re.ASCII)
     if found is None:
-        seconds = seconds_of(text)
+        try:
+            seconds = seconds_of(text)
+        except UserError:  # which names no time as SLURM writes it
+            seconds = math.inf
         if math.isinf(seconds):
-            raise UserError("A job's time is a length of time such as 2:00:00 or 2h.")
+            raise UserError(f"A job's time is a length of time such as 2:00:00 or 2h, not {text!r}.")
     else:
         days, *parts = (None if part is None else int(part) for part in found.groups())
         given = [part for part in parts if part is not None]
