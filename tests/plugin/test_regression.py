@@ -186,6 +186,22 @@ def test_a_new_history_names_the_changed_setting(accepted: Any) -> None:
     )
 
 
+def test_a_new_history_takes_no_method_for_another_of_its_name(project: Any) -> None:
+    two = REPRODUCTION.replace("    def init(", "    weight: float = 1.0\n\n    def init(", 1)
+    two = two.replace('"coin": Coin()', '"coin": Coin(), "heavy": Coin(weight=2.0)')
+    compared = "verdict(trials({!r}, on='parity').reward > trials({!r}, on='parity').reward)"
+    project.write(a=compared.format("coin", "heavy"), b=compared.format("heavy", "coin"))
+    project.pytester.makepyfile(tiny_paper=two)
+    project.run(own_store=True)
+    assert main(["accept", "--tier=smoke"]) == 1
+    sys.modules.pop("tiny_paper", None)
+    project.pytester.makepyfile(tiny_paper=two.replace('"smoke": Tier(conditions(1)', '"smoke": Tier(conditions(3)'))
+    shown = project.run(own_store=True)
+    for claim, methods in (("a", ("coin", "heavy")), ("b", ("heavy", "coin"))):
+        longer = "; ".join(f"of {method} on parity, budget.generations 1 -> 3" for method in methods)
+        shown.stdout.fnmatch_lines([f"{claim} (smoke): a new history begins, *: {longer}"])
+
+
 def test_a_new_history_of_unknown_trials_has_fingerprints_alone(accepted: Any) -> None:
     accepted.write(a=ALMOST)
     _edit(outcome=Outcome.REFUTED, trials="0" * 64)

@@ -179,10 +179,13 @@ def _new_history(session: Session, report: ClaimReport, old: AcceptedVerdict, st
             [trials for trials in of_source if _alike(trials[0].spec, condition.plain) >= alike]
             for of_source, condition in zip(groups, now.values(), strict=True)
         ]
+        found = []
         for chosen in itertools.product(*sides) if math.prod(map(len, sides)) <= MOST else ():
             digests = {trial.id: trial.digest for trials in chosen for trial in trials}
             if content_hash(sorted(digests.values())) == old.trials:
-                return _settings(now, chosen)
+                found.append(_settings(now, chosen))
+        if found:  # the same trials may also stand for each other's conditions, which would differ in more settings
+            return _in_words(min(found, key=lambda changed: sum(map(len, changed.values()))))
     return ""
 
 
@@ -201,12 +204,16 @@ def _alike(old: Mapping[str, Any], new: Mapping[str, Any]) -> int:
     return sum(one == other for one, other in zip(*names, strict=True) if one is not None)
 
 
-def _settings(now: Mapping[str, Condition], before: Sequence[Sequence[TrialResult]]) -> str:
-    changed = {
+def _settings(now: Mapping[str, Condition], before: Sequence[Sequence[TrialResult]]) -> dict[str, str]:
+    """Return what differs in the settings of each condition that is another one now, by label."""
+    return {
         label: changed_settings(trials[0].spec, condition.plain)
         for (label, condition), trials in zip(now.items(), before, strict=True)
         if trials[0].condition != condition.id
     }
+
+
+def _in_words(changed: Mapping[str, str]) -> str:
     return (
         "; ".join(f"of {label}, {text}" for label, text in changed.items())
         or "its trials are of the same conditions, but its assertion, its design or the rules of judging differ"
