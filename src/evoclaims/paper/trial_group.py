@@ -48,9 +48,11 @@ def steps_to(source: Source, condition: Condition, curve: str, value: float, lev
     every = max(condition.report_distance, 1)
     name = f"environment steps until {curve} is {float(value):.12g}" + f" on level {wanted}" * (levels > 1)
 
+    def last_before(trial: TrialResult, step: float) -> float:
+        return max((at for at in trial.curves[_AXIS] if at < step), default=0.0)
+
     def before(trial: TrialResult) -> float:
-        first = read(trial)
-        return max((at for at in trial.curves[_AXIS] if at < first), default=0.0)
+        return last_before(trial, read(trial))
 
     def read(trial: TrialResult) -> float:
         steps = trial.curves[_AXIS]
@@ -66,7 +68,7 @@ def steps_to(source: Source, condition: Condition, curve: str, value: float, lev
                 "and nobody knows when it would have reached that: "
                 f"{advice}ask for a value that ended trials have reached"
             )
-        last = max((at for at in steps if at < first), default=0.0)
+        last = last_before(trial, first)
         if condition.loop and first - last > 2 * every and not math.isinf(first):  # it reports when it likes
             raise UnreadableTrialError(
                 f"The trial of seed {trial.seed_in_words} of {source.label} reports nothing between {last:,.12g} and "
