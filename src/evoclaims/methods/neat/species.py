@@ -136,15 +136,19 @@ def _grouped_at_once(settings: Species, centres: Genome, count: Int[Array, ""], 
         alone = jax.tree.map(lambda leaf: leaf[None], founder)
         return distances(settings, by_gene, alone, jnp.ones((), jnp.int32))[0]
 
-    def recentre(place: Array, centre_of: Array) -> Array:
-        is_centre = jnp.any(centre_of[:, None] == everyone[None, :], axis=0)
-        chosen = jnp.argmin(jnp.where(is_centre, jnp.inf, to_old[place])).astype(jnp.int32)
-        return jnp.where((places == place) & (place < count), chosen, centre_of)
+    def recentred(chosen: Array) -> Array:
+        """Choose for each old centre the nearest genome that is not `chosen` for an earlier one."""
+        takers = jnp.where(chosen[:, None] == everyone[None, :], places[:, None], settings.most)
+        free = jnp.min(takers, axis=0)[None, :] >= places[:, None]
+        nearest = jnp.argmin(jnp.where(free, to_old, jnp.inf), axis=1).astype(jnp.int32)
+        return jnp.where(places < count, nearest, NONE)
 
     everyone, places = jnp.arange(population.node_count.shape[0]), jnp.arange(settings.most, dtype=jnp.int32)
     by_gene = turned(population)  # once, and not for each founder
     to_old = distances(settings, by_gene, centres, count)
-    chosen = jax.lax.fori_loop(0, settings.most, recentre, jnp.full((settings.most,), NONE, jnp.int32))
+    # One after the other would be as many rounds as species. Two seldom want the same genome.
+    wanted = recentred(jnp.full((settings.most,), NONE, jnp.int32))
+    chosen = jax.lax.while_loop(lambda chosen: jnp.any(recentred(chosen) != chosen), recentred, wanted)
     centre_of = jnp.where(chosen == NONE, 0, chosen)
     to_new = distances(settings, by_gene, take_rows(population, centre_of), count)
     is_centre = chosen[:, None] == everyone[None, :]
