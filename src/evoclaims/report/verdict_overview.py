@@ -198,15 +198,19 @@ def marks(
 
 
 def mark(reports: Iterable[ClaimReport]) -> str:
-    """Return the mark of a sentence's cases, such as "✓"; with numbers of cases where they differ, such as "✓1 ✗3".
+    """Return the mark of a sentence's cases, such as "✓"; with numbers of cases where they differ, such as "✓1 ✗3 –1".
 
-    Support that is counted apart is in brackets.
+    Support that is counted apart is in brackets. Cases that are not judged stand beside judged ones, which else would
+    seem to be all of the sentence.
     """
-    tallies = Counter(report.counted_as for report in reports if report.outcome is not Outcome.NOT_RUN)
+    tallies = Counter(report.counted_as for report in reports)
+    left_out = tallies.pop(Tally.NOT_RUN, 0)
     found: Counter[str] = Counter()
     for tally in Tally:
         found[f"({tally.symbol})" if tally in APART else tally.symbol] += tallies[tally]
     shown = {symbol: count for symbol, count in found.items() if count}
+    if shown and left_out:
+        shown[NONE] = left_out
     if len(shown) < 2:
         return next(iter(shown), NONE)
     return " ".join(f"{symbol}{count}" for symbol, count in shown.items())
