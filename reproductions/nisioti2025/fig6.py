@@ -13,7 +13,7 @@ FIGURE = Figure(
         ),
         listed=(
             ("share of the reachable cells with an elite", lambda trials: trials.archive_coverage),
-            ("reward of the best elite", lambda trials: trials.reward),
+            ("reward of the best elite in ten new episodes", lambda trials: trials.reward),
         ),
     ),
 )

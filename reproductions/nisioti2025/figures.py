@@ -43,7 +43,7 @@ def stones_and_rewards(methods: tuple[Series, ...], places: Mapping[str, str]) -
                 methods,
                 places,
                 PUBLISHED,
-                ylabel="stones crossed, of 7",
+                ylabel="stones crossed",
                 limits=(0.0, 7.0),
             ),
             compared("reward", lambda trials: trials.reward, methods, places, PUBLISHED, ylabel="reward of an episode"),

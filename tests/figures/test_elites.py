@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import replace
 from typing import Any
 
@@ -14,6 +15,8 @@ from evoclaims.envs.ecorobot.stones import SteppingStones
 from evoclaims.figures.elites import ElitesMap, Ground
 from evoclaims.methods.map_elites import MapElites
 from evoclaims.networks.mlp import Mlp
+from evoclaims.paper import references
+from evoclaims.trials.arrays import pack
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.result_making import named_leaves
 from evoclaims.trials.spec import Budget, Condition
@@ -66,6 +69,18 @@ def test_the_map_of_the_first_stored_champion_is_drawn(mapped: Any) -> None:
     assert "stones (seed 2)" in words(drawing)
     assert drawing.missing == ("Run in part: map_elites on maze (3 of 10 trials).",)
     assert collisions(drawing) == []
+
+
+def test_a_committed_champion_has_a_map_too(mapped: Any) -> None:
+    packed = pack(_champion())
+    made_elsewhere = replace(made(MAZE, 2, 60.0), curves={"coverage": (1.0,)})
+    trial = replace(made_elsewhere, champion=hashlib.sha256(packed).hexdigest())
+    folder = mapped.reproduction.references
+    references.write(references.path_of(folder, "full", "map_elites", "maze"), [trial])
+    path = references.champion_path(folder, "full", trial)
+    path.parent.mkdir()
+    path.write_bytes(packed)
+    assert "stones (seed 2)" in words(mapped.draw(ELITES))
 
 
 def test_without_a_stored_champion_the_figure_says_so_and_tells_the_records(mapped: Any) -> None:

@@ -1,4 +1,4 @@
-"""Maps of elites: the fitness of each elite where its episode ended, from champions in the store."""
+"""Maps of elites: the fitness of each elite where its episode ended, from champions stored or committed."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from evoclaims.figures import sheet
 from evoclaims.figures.figure import Drawing, Heading, Scope
 from evoclaims.figures.sheet import FAINT, SMALL, TEXT, plain
 from evoclaims.figures.trial_numbers import MeasureOf, TrialNumbers, absences, frame, read
+from evoclaims.paper import references
 from evoclaims.trials import champion_replay
 
 LINE: Final = 0.12
@@ -50,7 +51,7 @@ class Map(NamedTuple):
 
 @dataclass(frozen=True)
 class ElitesMap:
-    """Maps side by side, each of the first trial whose champion is stored; below, measures of all trials.
+    """Maps side by side, each of the first trial whose champion is stored or committed; below, measures of all trials.
 
     Attributes:
         grounds: one per panel.
@@ -92,19 +93,23 @@ def _task(scope: Scope, ground: Ground) -> Maze:
 
 
 def _first_map(scope: Scope, ground: Ground) -> Map | None:
-    """Return the map of the first trial whose champion is in the store; None without any."""
-    condition = scope.tier.condition(ground.method, ground.task)
+    """Return the map of the first trial whose champion is in the store, or committed; None without any."""
+    condition, folder = scope.tier.condition(ground.method, ground.task), scope.archive.references
     for result in scope.group(ground.method, ground.task).fetch(scope.seeds):
         if scope.archive.store.has_champion(result):
             _, fitnesses = champion_replay.load(scope.archive.store, condition, result)
-            return Map(result.seed, result.id, np.asarray(fitnesses))
+        elif folder is not None and (arrays := references.champion_of(folder, scope.tier_name, result)) is not None:
+            _, fitnesses = champion_replay.unpacked(arrays, condition, result)
+        else:
+            continue
+        return Map(result.seed, result.id, np.asarray(fitnesses))
     return None
 
 
 def _unmapped(scope: Scope, ground: Ground) -> str:
     return (
-        f"No map of {ground.method} on {ground.task} is stored (maps lie with champions, which reference trials leave "
-        f"out): `evoclaims run {ground.method} --on {ground.task} --tier {scope.tier_name} --trials 1` makes one."
+        f"No map of {ground.method} on {ground.task} is stored (maps lie with champions, of which few are committed): "
+        f"`evoclaims run {ground.method} --on {ground.task} --tier {scope.tier_name} --trials 1` makes one."
     )
 
 
