@@ -109,7 +109,7 @@ class PaperTrials(TrialGroup):
 
     @property
     def target_found(self) -> Measure:
-        """1 if some individual has reached the target, else 0; for methods with an archive."""
+        """1 if some individual has reached the target, among stones after all others, else 0; with an archive."""
         return self.measure("whether the target was found", lambda t: t.curves["reached"][-1])
 
     @property
@@ -119,7 +119,7 @@ class PaperTrials(TrialGroup):
 
     @property
     def has_found_the_target(self) -> Event:
-        """Some individual has reached the target; for methods with an archive."""
+        """Some individual has reached the target, among stones after all others; for methods with an archive."""
         return self.event("has found the target", lambda t: t.curves["reached"][-1] == 1)
 
     def ends_within(self, distance: float) -> Event:
@@ -155,7 +155,7 @@ class PaperTrials(TrialGroup):
 
     @property
     def reward_in_training(self) -> Measure:
-        """Reward of the last generation's best individual in its only episode; for methods that evolve."""
+        """Reward of the last generation's best individual, or the archive's best elite, in its only episode."""
         return self.measure("reward of training's best episode", lambda t: t.curves["fitness"][-1], unit=self._paid)
 
     @property

@@ -5,16 +5,20 @@ from __future__ import annotations
 import statistics
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
 from evoclaims.judging.effect import a12
 from evoclaims.judging.exact import rank_test
 from evoclaims.judging.kinds.greater import GreaterTests
 from evoclaims.judging.verdict import Outcome
-from evoclaims.paper.references import committed
+from evoclaims.paper.references import champion_of, committed
+from evoclaims.trials.champion_replay import unpacked
 from evoclaims.trials.result import TrialResult
 from reproductions.nisioti2025 import REPRODUCTION
+from reproductions.nisioti2025.null_agents import no_action
 
 PROTOCOL = (Path(__file__).parents[2] / "docs" / "protocol.md").read_text(encoding="utf-8")
 SAID = " ".join(PROTOCOL.split())
@@ -133,6 +137,29 @@ def test_comparisons_among_obstacles_with_all_published_settings_are_those_of_th
     assert f"{ppo:,.0f} and {neat:,.0f} an episode" in SAID
 
 
+def test_how_many_archives_have_an_elite_at_the_target_is_that_of_the_committed_maps() -> None:
+    """The event that trials record asks for all stones besides."""
+    trials = committed(REPRODUCTION.references, "full", "map_elites", "stones")
+    condition = REPRODUCTION.tiers["full"].conditions["map_elites", "stones"]
+    task: Any = condition.task
+    (west, east), (south, north) = task.area
+    method: Any = condition.method
+    across, up = method.cells
+    cell = int((task.target[0] - west) / (east - west) * across), int((task.target[1] - south) / (north - south) * up)
+    found = []
+    for trial in trials:
+        arrays = champion_of(REPRODUCTION.references, "full", trial)
+        assert arrays is not None
+        found.append(unpacked(arrays, condition, trial)[1][cell])
+    there = sorted(float(reward) for reward in found if np.isfinite(reward))
+    idle = no_action(condition)
+    assert idle is not None
+    assert (len(there), len(trials)) == (2, 30)
+    assert f"in two trials of thirty at the target (with {there[0]:.0f} and {there[1]:.0f}, less than an idle" in SAID
+    assert f"robot's {idle['metrics']['last_fitness']:.0f}), none with all stones" in SAID
+    assert not any(trial.curves["reached"][-1] for trial in trials)
+
+
 @pytest.mark.parametrize("method", NAMES)
 def test_training_lengths_are_those_of_the_conditions(method: str) -> None:
     cells = [NAMES[method]]
@@ -236,6 +263,45 @@ def test_direct_encodings_on_average_over_levels_of_simple_alu_are_those_of_the_
 
     neat, cma_es = (a12(means(method), means("hyperneat")) for method in ("neat", "cma_es"))
     assert f"on Simple ALU NEAT's A12 against HyperNEAT is {neat:.2f}, CMA-ES's {cma_es:.2f}" in READINGS
+
+
+def test_how_many_neurons_of_a_champion_lie_between_inputs_and_outputs_is_that_of_the_committed_ones() -> None:
+    task = REPRODUCTION.tiers["full"].conditions["neat", "stones"].task
+    ends = task.observation_size + task.action_size
+    neurons, between, connections = [], [], []
+    for trial in committed(REPRODUCTION.references, "full", "neat", "stones"):
+        arrays = champion_of(REPRODUCTION.references, "full", trial)
+        if arrays is None:
+            continue
+        keys = arrays[".nodes.key"][: int(arrays[".node_count"])]
+        places = arrays[".connections.source"], arrays[".connections.target"]
+        links = [*zip(*(place[: int(arrays[".connection_count"])].tolist() for place in places), strict=True)]
+        fed, feeding = set(np.flatnonzero(keys < task.observation_size)), set(np.flatnonzero(keys < ends))
+        feeding -= fed
+        for _ in keys:
+            fed |= {target for source, target in links if source in fed}
+            feeding |= {source for source, target in links if target in feeding}
+        neurons.append(len(keys) - ends)
+        between.append(sum(bool(keys[slot] >= ends) for slot in fed & feeding))
+        connections.append(sum(source in fed and target in feeding for source, target in links))
+    half = sum(count <= ends for count in between)
+    assert f"of the {len(between)} committed champions of the maze {min(between)} to {max(between)} hidden" in READINGS
+    assert f"(median {statistics.median(between):g}) of {min(neurons)} to {max(neurons)}, with" in READINGS
+    assert f"{min(connections)} to {max(connections)} connections, and in {half} of {len(between)} at most" in READINGS
+
+
+def test_obstacles_passed_with_levels_and_without_them_are_those_of_the_trials() -> None:
+    def passed(method: str, task: str) -> list[float]:
+        return [float(t.metrics["obstacles"]) for t in committed(REPRODUCTION.references, "full", method, task)]
+
+    neat, ppo = (
+        [statistics.mean(passed(method, task)) for task in ("obstacles_high", "obstacles")]
+        for method in ("neat", "ppo")
+    )
+    assert f"NEAT passes {neat[0]:.1f} of fifteen without levels; with levels it passes {neat[1]:.1f}" in READINGS
+    assert f"PPO passes {ppo[0]:.1f} without levels, and with them {ppo[1]:.1f}, so" in READINGS
+    assert [max(passed(method, "obstacles")) == 15 for method in ("neat", "ppo")] == [True, False]
+    assert passed("neat", "obstacles").count(15) == 1
 
 
 def test_what_is_left_of_the_reward_of_the_episode_that_made_a_champion_is_that_of_the_trials() -> None:
