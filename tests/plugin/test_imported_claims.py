@@ -88,7 +88,12 @@ def test_one_row_is_no_independent_trial_of_two_conditions(ours: Project, settin
 
 
 @pytest.mark.parametrize(
-    ("curve", "outcome"), [((1 / 3, 2 / 3, 1 / 7), "inconclusive"), ((0.25, 0.5, 2 / 3), "supported")]
+    ("curve", "outcome"),
+    [
+        ((1 / 3, 2 / 3, 1 / 7), "inconclusive"),
+        ((0.25, 0.5, 2 / 3), "supported"),
+        ((0.14, 0.28, 0.57), "supported"),  # times 10,000 they are no whole numbers, but for rounding
+    ],
 )
 def test_one_curve_under_ten_seeds_counts_once_unless_it_may_be_chance(
     ours: Project, curve: tuple[float, ...], outcome: str

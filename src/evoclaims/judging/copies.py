@@ -13,8 +13,8 @@ from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.sample import Trials
 from evoclaims.trials.result import COMPLETE, RETURNED, TRAINED_BY, TrialResult
 
-SHORT: Final = 10_000
-"""Numbers that are whole when multiplied by this may be equal by chance, as shares of few episodes are."""
+SHORT: Final = 4
+"""Numbers that so many decimals write may be equal by chance, as shares of few episodes are."""
 
 MOST_BY_CHANCE: Final = 3
 """So many other numbers, all different, that two imported trials share all are no chance."""
@@ -87,7 +87,7 @@ def _training(trial: TrialResult) -> Hashable | None:
         return trial.champion, trial.curves_hash
     if "imported" in trial.spec:
         read = [*trial.metrics.values(), *itertools.chain.from_iterable(trial.curves.values())]
-        long = {number for number in read if math.isfinite(number) and not (number * SHORT).is_integer()}
+        long = {number for number in read if math.isfinite(number) and number != round(number, SHORT)}
         return (repr(sorted(trial.metrics.items())), trial.curves_hash) if len(long) >= MOST_BY_CHANCE else None
     if TRAINED_BY not in trial.provenance or trial.status not in COMPLETE or not trial.digest:  # a pilot has no digest
         return None
