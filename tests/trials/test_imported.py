@@ -71,6 +71,16 @@ def test_filters_know_numbers_and_texts(table: Callable[..., Imported], lr: obje
     assert _values(table(where={"lr": lr})) == ([10.5, 30.5, 20.5] if lr == 0.001 else [10.5, 30.5])
 
 
+@pytest.mark.parametrize("form", ["csv", "jsonl"])
+def test_filters_know_all_digits_of_a_whole_number(table: Callable[..., Imported], form: str) -> None:
+    rows = [(1, 2**53, 10.5), (2, 2**53 + 1, 20.5)]
+    lines = ["seed,run,return", *(",".join(map(str, row)) for row in rows)]
+    if form == "jsonl":
+        lines = [json.dumps(dict(zip(("seed", "run", "return"), row, strict=True))) for row in rows]
+    for _, number, value in rows:
+        assert _values(table("\n".join(lines), f"runs.{form}", where={"run": number})) == [value]
+
+
 @pytest.mark.parametrize("said", ["true", "True", "TRUE", "1"])
 def test_filters_know_true_however_it_is_written(table: Callable[..., Imported], said: str) -> None:
     assert _values(table(f"seed,return,done\n1,5,{said}\n2,6,no\n", where={"done": True})) == [5]

@@ -147,9 +147,17 @@ def _is(cell: Any, value: object) -> bool:
     if isinstance(value, bool) and str(cell).lower() == str(value).lower():
         return True
     try:
-        return isinstance(value, int | float) and float(cell) == value
+        return isinstance(value, int | float) and _exact(cell) == value
     except (TypeError, ValueError):
         return False
+
+
+def _exact(cell: Any) -> int | float:
+    """Return the number in a cell; of a whole one all digits, which a float has not."""
+    try:
+        return int(str(cell))
+    except ValueError:  # 1e3, 7.0, True
+        return float(cell)
 
 
 def _is_inexact(cell: Any, number: float) -> bool:
