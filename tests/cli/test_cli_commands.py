@@ -40,12 +40,14 @@ def test_an_edited_method_of_the_same_revision_is_told_wherever_its_trials_count
         text = paper.read_text(encoding="utf-8")
         paper.write_text(text.replace(old, new) if old else text, encoding="utf-8")
         sys.modules.pop("tiny_paper", None)
-        return [told in evoclaims(*command)[1] for command in (("run", "coin"), ("run", "coin"), ("status",))]
+        more = ("reference", "--unknown-revision"), ("accept", "--tier", "smoke"), ("compare", "--tier", "smoke")
+        return [told in evoclaims(*command)[1] for command in (("run", "coin"), ("run", "coin"), ("status",), *more)]
 
-    assert after() == [False, False, False]
-    assert after("1.0, -1.0)", "2.0, -2.0)") == [True, True, True]
+    assert after() == [False] * 6
+    Path("verdicts.toml").unlink()
+    assert after("1.0, -1.0)", "2.0, -2.0)") == [True] * 6
     assert "a (smoke)" in evoclaims("status")[1].partition(told)[2]
-    assert after("revision: ClassVar[int] = 1", "revision: ClassVar[int] = 2") == [False, False, False]
+    assert after("revision: ClassVar[int] = 1", "revision: ClassVar[int] = 2") == [False] * 6
 
 
 @pytest.mark.parametrize(

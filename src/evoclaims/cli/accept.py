@@ -9,6 +9,7 @@ from evoclaims.cli.project import open_project
 from evoclaims.core.files import write_atomically
 from evoclaims.verdicts import history
 from evoclaims.verdicts.acceptance import accept
+from evoclaims.verdicts.other_code import edits
 
 
 def main(options: argparse.Namespace) -> int:
@@ -28,6 +29,8 @@ def main(options: argparse.Namespace) -> int:
     if not (made.accepted or made.retired):
         print(f"{path} stays as it is: no verdict differs from the accepted one.")
         return 0
+    for line in edits(reports):
+        print(line)
     write_atomically(path, history.dump(made.history).encode())
     for line in made.accepted:
         print(f"accepted: {line}")

@@ -15,6 +15,7 @@ from evoclaims.paper import references
 from evoclaims.trials.failed import is_final
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import TrialSpec
+from evoclaims.verdicts.other_code import summary
 from evoclaims.verdicts.source_trials import change
 
 
@@ -88,6 +89,8 @@ def main(options: argparse.Namespace) -> int:
             )
             + (f", made with other versions than are installed: {upgraded}" if upgraded else "")
         )
+        for name in condition.edited_since(results[:size]):
+            print(f"  {printable(summary(name))}")
     if unknown:
         raise UserError(
             f"Trials of {', '.join(unknown)} ran code of an unknown revision: there was no git "

@@ -17,7 +17,7 @@ from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import DamagedFileError
 from evoclaims.verdicts import history, transitions
 from evoclaims.verdicts.claim_report import ClaimReport
-from evoclaims.verdicts.other_code import listed
+from evoclaims.verdicts.other_code import edits, listed
 from evoclaims.verdicts.source_trials import found_in, moved
 from evoclaims.verdicts.transitions import Standings
 
@@ -33,7 +33,7 @@ class Side:
         name: in words, such as "the store old".
         verdicts: by tier and claim.
         trials: by condition.
-        troubles: a line for each file that could not be read.
+        troubles: a line for each file that could not be read, and for code that was edited after its trials had run.
         reads: what claims read of each trial, by condition, where that is known.
         methods: by condition, below its tier and variant, for a store. Conditions of one method are tested jointly.
     """
@@ -89,7 +89,7 @@ def store(reproduction: Reproduction, archive: Archive, reports: Iterable[ClaimR
             path = references.path_of(folder, name.tier, name.method, name.task).relative_to(reproduction.references)
             trials[_named(path)].append(trial)
             methods[_named(path)] = PurePosixPath(path.parent, name.method)
-    troubles = tuple(f"not read: {error}" for error in damaged)
+    troubles = (*(f"not read: {error}" for error in damaged), *edits(reports))
     reads: dict[str, set[str]] = defaultdict(set)
     for report in reports:
         for source in report.sources:

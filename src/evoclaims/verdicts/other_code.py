@@ -27,11 +27,8 @@ def lines(reports: Sequence[ClaimReport]) -> list[str]:
     """Return lines on claims judged from mixed or other versions of packages, or from code that was edited since."""
     mixed: dict[str, list[str]] = defaultdict(list)
     foreign: dict[str, list[str | None]] = defaultdict(list)
-    edits: dict[str, list[str]] = defaultdict(list)
     elsewhere = []
     for report in reports:
-        for name in edited(report):
-            edits[name].append(f"{report.name} ({report.tier})")
         versions = versions_of(report.sources)
         several = [f"{name} {in_words(those)}" for name, those in versions.items() if len(those) > 1]
         if several:
@@ -51,8 +48,16 @@ def lines(reports: Sequence[ClaimReport]) -> list[str]:
             for name, those in sorted(foreign.items())
         )
         lines.append(f"trials from other versions than the installed ones: {', '.join(packages)}: {listed(elsewhere)}")
-    lines += [f"{summary(name)}: {listed(names)}" for name, names in sorted(edits.items())]
-    return [printable(line) for line in lines]
+    return [*map(printable, lines), *edits(reports)]
+
+
+def edits(reports: Sequence[ClaimReport]) -> list[str]:
+    """Return a line for each method and task that was edited after trials behind claims had run."""
+    found: dict[str, list[str]] = defaultdict(list)
+    for report in reports:
+        for name in edited(report):
+            found[name].append(f"{report.name} ({report.tier})")
+    return [printable(f"{summary(name)}: {listed(names)}") for name, names in sorted(found.items())]
 
 
 def listed(names: Sequence[str]) -> str:
