@@ -7,6 +7,7 @@ import importlib
 import math
 import sys
 from collections.abc import Callable, Iterator
+from functools import reduce
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ import jax.numpy
 import pytest
 
 from evoclaims import TrainingLoop
+from evoclaims.core import source_code
 from evoclaims.core.source_code import PARTS, code_of, is_edited
 from evoclaims.envs import NParity
 from evoclaims.methods import HandBuilt
@@ -62,6 +64,16 @@ class Own(CmaEs):
 
 def trained(task, seed, budget):
     return {"last_fitness": RATE}
+
+
+class Trainer:
+    @staticmethod
+    def alone(task, seed, budget):
+        return {"last_fitness": RATE}
+
+    @classmethod
+    def train(cls, task, seed, budget):
+        return cls.alone(task, seed, budget)
 '''
 
 HELPERS = """
@@ -278,10 +290,26 @@ def test_code_of_this_package_has_no_hash_since_trials_record_its_version() -> N
     assert code_of(HandBuilt(), NParity(3)) == {}
 
 
-def test_the_function_of_a_training_loop_is_looked_at(found: Found) -> None:
+@pytest.mark.parametrize("name", ["trained", "Trainer.alone", "Trainer.train"])
+def test_the_function_of_a_training_loop_is_looked_at(found: Found, name: str) -> None:
     def loop(module: Any) -> TrainingLoop:
-        return TrainingLoop(module.trained, packages=())
+        return TrainingLoop(reduce(getattr, name.split("."), module), packages=())
 
     before, after = found(make=loop), found("RATE}", "2 * RATE}", make=loop)
-    assert list(before) == list(after) == ["its_method.trained"]
+    assert list(before) == list(after) == [f"its_method.{name.partition('.')[0]}"]
     assert before != after
+
+
+def test_a_training_loop_that_only_its_own_processes_import_is_looked_at_as_a_text(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(str(tmp_path))
+    hashes = []
+    for text in ("import torch\nRATE = 1", "import torch  # no edit\n\nRATE = 1", "import torch\nRATE = 2"):
+        (tmp_path / "its_far_loops.py").write_text(text, encoding="utf-8")
+        importlib.invalidate_caches()
+        hashes.append(code_of(TrainingLoop("its_far_loops:train", packages=()), NParity(2)))
+        source_code._TEXTS.clear()
+    assert [list(one) for one in hashes] == [["its_far_loops"]] * 3
+    assert hashes[0] == hashes[1] != hashes[2]
+    assert code_of(TrainingLoop("json.tool:main", packages=()), TrainingLoop("nowhere:train", packages=())) == {}

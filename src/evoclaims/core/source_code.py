@@ -9,8 +9,8 @@ import inspect
 import sys
 import sysconfig
 from collections.abc import Iterator, Mapping
-from functools import cache, partial
-from importlib.util import resolve_name
+from functools import cache, partial, reduce
+from importlib.util import find_spec, resolve_name
 from pathlib import Path
 from textwrap import dedent
 from types import ModuleType
@@ -48,11 +48,14 @@ def code_of(*components: Any) -> dict[str, str]:
     its bases, and the functions, classes, constants, arrays, sets and dataclasses that these name, directly or through
     each other; of other objects that they name, the statements of the module that make them, and what these name.
     Comments, docstrings, layout and what ids hold anyhow (values of fields, `revision`) do not count. What is reached
-    in other ways, such as by a name that is made of words, is not seen.
+    in other ways, such as by a name that is made of words, is not seen. A module that only other processes import is
+    known by its text alone.
     """
     code = {one for component in components for one in _code(component)}
-    parts = frozenset(one for one in code if inspect.isclass(one))
-    found = {f"{one.__module__}.{one.__qualname__}": _hash(one, parts) for one in code if _is_the_projects(one)}
+    parts = frozenset(one for one in code - {*map(_at, components)} if inspect.isclass(one))
+    found: dict[str, str] = dict(one for one in code if isinstance(one, tuple))
+    own = (one for one in code if not isinstance(one, tuple) and _is_the_projects(one))
+    found |= {f"{one.__module__}.{one.__qualname__}": _hash(one, parts) for one in own}
     return {name: found[name] for name in sorted(found)}
 
 
@@ -62,7 +65,7 @@ def is_edited(then: str | None, now: str) -> bool:
 
 
 def _code(component: Any) -> Iterator[Any]:
-    """Yield the classes of a component and of the parts in its fields, and the function of a training loop."""
+    """Yield the classes of a component and of the parts in its fields, and the loop or environment at its place."""
     if type(component) in _WITHOUT_CODE:
         return
     if isinstance(component, Mapping):
@@ -73,11 +76,37 @@ def _code(component: Any) -> Iterator[Any]:
                 yield from _code(part)
     elif dataclasses.is_dataclass(component) and not isinstance(component, type):
         yield type(component)
-        module, _, name = str(getattr(component, "place", "")).partition(":")
-        if name and inspect.isfunction(function := getattr(sys.modules.get(module), name, None)):
-            yield function
+        if found := _at(component):
+            yield found
         for field in dataclasses.fields(component):
             yield from _code(getattr(component, field.name))
+
+
+_TEXTS: Final[dict[str, tuple[str, str] | None]] = {}
+"""Modules of the project that may be imported later, each with one hash of its text in a process; None for others."""
+
+
+def _at(component: Any) -> Any:
+    """Return the function or class at a component's place, the class that has a method, or a module and its hash."""
+    module, _, name = str(getattr(component, "place", "")).partition(":")
+    if not name:
+        return None
+    words = name.split(".")[:-1] or [name]  # of a method the class, with what it calls
+    try:
+        if module in sys.modules and module not in _TEXTS:
+            found = reduce(getattr, words, sys.modules[module])
+            return found if inspect.isfunction(found) or inspect.isclass(found) else None
+        if module not in _TEXTS:  # to look for a module imports its package, which of installed ones may take long
+            foreign = _is_installed(_file_of(module.partition(".")[0]))
+            tree = None if foreign else _as_lists(_without_words(ast.parse(_file_of(module).read_bytes())))
+            _TEXTS[module] = tree and (module, content_hash(tree)[:DIGITS])
+        return _TEXTS[module]
+    except Exception:  # there is no such thing, which is told where it is used; or its package is broken
+        return None
+
+
+def _file_of(module: str) -> Path:
+    return Path(getattr(find_spec(module), "origin", None) or "")
 
 
 @cache
@@ -301,14 +330,21 @@ def _parsed(one: Any) -> ast.Module:
 
 def _tree(one: Any) -> ast.Module:
     """Return the code of a class or function without what does not count."""
-    tree = _parsed(one)
+    tree = _without_words(_parsed(one))
     for node in ast.walk(tree):
-        if isinstance(node, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
-            if ast.get_docstring(node) is not None:
-                node.body = node.body[1:] or [ast.Pass()]
-            if isinstance(node, ast.ClassDef):
-                for statement in _held_by_ids(node):
-                    statement.value = None
+        if isinstance(node, ast.ClassDef):
+            for statement in _held_by_ids(node):
+                statement.value = None
+    return tree
+
+
+def _without_words(tree: ast.Module) -> ast.Module:
+    """Return code without its docstrings."""
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+            continue
+        if ast.get_docstring(node) is not None:
+            node.body = node.body[1:] or [ast.Pass()]
     return tree
 
 

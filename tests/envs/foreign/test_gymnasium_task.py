@@ -16,6 +16,7 @@ import numpy as np
 from gymnasium.utils.env_checker import check_env
 
 from evoclaims.core.errors import UserError
+from evoclaims.core.source_code import code_of
 from evoclaims.envs.foreign.gymnasium_task import GymnasiumEnv, GymnasiumTask
 from evoclaims.envs.foreign.scoring import ForeignTask
 from evoclaims.envs.gates.parity import NParity
@@ -94,6 +95,18 @@ def test_an_unknown_environment_or_setting_is_a_sentence() -> None:
         GymnasiumTask("FrozenLake-v1", {"map_name": "bad"}).make()
     with pytest.raises(UserError, match=r"CartPole-v1 has providers='ale-py'\. Write a tuple, such as"):
         GymnasiumTask("CartPole-v1", providers="ale-py")  # type: ignore[arg-type]
+
+
+class Own(gymnasium.Env[Any, Any]):
+    pass
+
+
+@pytest.mark.parametrize("maker", [Own, f"{__name__}:Own"])
+def test_the_class_of_a_user_s_own_environment_is_looked_at(maker: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    spec = gymnasium.envs.registration.EnvSpec("Own-v0", entry_point=maker)
+    monkeypatch.setitem(gymnasium.registry, "Own-v0", spec)
+    assert list(code_of(GymnasiumTask("Own-v0"))) == [f"{__name__}.Own"]
+    assert code_of(CART) == code_of(GymnasiumTask("CartPole-v9")) == {}
 
 
 def test_a_method_that_is_compiled_says_what_to_do_instead(store_of: Store) -> None:

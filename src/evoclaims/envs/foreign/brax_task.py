@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import sys
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -15,6 +16,7 @@ from jaxtyping import Array, PRNGKeyArray
 
 from evoclaims.core.errors import require_known
 from evoclaims.envs.foreign.jax_task import JaxTask, Moment, Range
+from evoclaims.envs.foreign.scoring import place_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,6 +39,12 @@ class BraxTask(JaxTask):
     def given(self) -> Mapping[str, Any]:
         """The settings."""
         return self.settings
+
+    @property
+    def place(self) -> str:
+        """Where the environment's class is, if Brax has been imported, as by whoever registers one."""
+        known = getattr(sys.modules.get("brax.envs"), "_envs", {})
+        return place_of(known[self.environment_id]) if self.environment_id in known else ""
 
     def make(self) -> Any:
         """Return Brax's environment, which neither truncates episodes nor resets itself.

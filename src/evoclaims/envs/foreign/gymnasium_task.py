@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from evoclaims.core.errors import UserError, require_at_least
 from evoclaims.envs.base import Task
 from evoclaims.envs.foreign.native_actions import native_action
-from evoclaims.envs.foreign.scoring import ForeignTask, Scored
+from evoclaims.envs.foreign.scoring import ForeignTask, Scored, place_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,6 +56,14 @@ class GymnasiumTask(ForeignTask):
     def packages(self) -> tuple[str, ...]:
         """The distributions that compute it."""
         return ("gymnasium", *self.providers)
+
+    @property
+    def place(self) -> str:
+        """Where the environment's class is, as it was registered."""
+        try:
+            return place_of(gymnasium.spec(self.environment_id).entry_point)
+        except Exception:  # `make` says what is wrong
+            return ""
 
     def make(self) -> Any:
         """Return a new environment; seed it by its `reset(seed=...)`.

@@ -19,6 +19,11 @@ Scored = tuple[float, float, Mapping[str, float]]
 """Fitness, success and metrics of a policy, as a task's `examine` has them."""
 
 
+def place_of(maker: Any) -> str:
+    """Return where the class or function is that makes an environment, "module:name"."""
+    return maker if isinstance(maker, str) else f"{maker.__module__}:{getattr(maker, '__qualname__', '')}"
+
+
 @dataclass(frozen=True, kw_only=True)
 class ForeignTask(ABC):
     """An environment of another library as a task with one level; training loops act in its own terms.
@@ -70,6 +75,11 @@ class ForeignTask(ABC):
     def name(self) -> str:
         """The environment's name, without the module that registers it."""
         return self.environment_id.rpartition(":")[2]
+
+    @property
+    def place(self) -> str:
+        """Where the environment's class is, "module:name", whose edits trials tell; empty where that is not known."""
+        return ""
 
     @abstractmethod
     def examine_natively(self, policy: Callable[[Any], Any], seed: int) -> Scored:
