@@ -142,6 +142,7 @@ def test_a_band_is_refuted_at_half_of_alpha(source, n, outcome) -> None:
         ([(1.0, 0.8, 0.6, 0.5)] * 10, SUPPORTED),
         ([(0.5, 0.6, 0.8, 1.0)] * 10, REFUTED),
         ([(1.0, 0.5, 0.5, 1.0)] * 10, INCONCLUSIVE),
+        ([(0.9000000357627869, 0.9, 0.9, 0.9)] * 10, INCONCLUSIVE),  # but for rounding to single precision
         (["diverged"] * 10, INCONCLUSIVE),
         ([(1.0, 0.8, 0.6, 0.5)] + ["diverged"] * 9, INCONCLUSIVE),  # one trial is one draw, of however many levels
         ([(1.0, 0.8, 0.6, 0.5)] * 5 + [(0.5, 0.6, 0.8, 1.0)] * 5, INCONCLUSIVE),
@@ -325,6 +326,29 @@ def test_the_evidence_says_which_trials_decide_nothing(source) -> None:
 def test_where_all_trials_are_at_the_number_nothing_was_attainable(source) -> None:
     verdict = judge(source("a", [90.0] * 10).score() > 90, FIXED_10)
     assert verdict.reason == "all 10 trials have the value 90: nothing to compare"
+
+
+NINE_OF_TEN, SEVEN_OF_TEN = 0.9000000357627869, 0.699999988079071
+"""As XLA computes the means of ten episodes."""
+
+
+@pytest.mark.parametrize(
+    ("values", "claim", "outcome"),
+    [
+        (NINE_OF_TEN, lambda a, b: a > 0.9, INCONCLUSIVE),
+        (SEVEN_OF_TEN, lambda a, b: a < 0.7, INCONCLUSIVE),
+        (SEVEN_OF_TEN, lambda a, b: a.between(0.7, 1), SUPPORTED),
+        (NINE_OF_TEN, lambda a, b: a.between(0, 0.9), SUPPORTED),
+        (NINE_OF_TEN, lambda a, b: a > b, INCONCLUSIVE),  # of a training loop, which has 64 bits
+        (NINE_OF_TEN, lambda a, b: b < a, INCONCLUSIVE),
+        (0.9001, lambda a, b: a > 0.9, SUPPORTED),
+        (0.9001, lambda a, b: a > b, SUPPORTED),
+        (2**24 + 1.0, lambda a, b: a > 2**24, SUPPORTED),  # counts are exact
+    ],
+)
+def test_rounding_to_single_precision_decides_nothing(source: Any, values: float, claim: Any, outcome: Outcome) -> None:
+    measures = source("a", [values] * 10).score(), source("b", [0.9] * 10).score()
+    assert judge(claim(*measures), FIXED_10).outcome is outcome
 
 
 @pytest.mark.parametrize(("n", "alpha"), [(5, 0.05), (6, 0.05), (7, 0.01)])

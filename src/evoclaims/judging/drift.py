@@ -17,7 +17,7 @@ from evoclaims.judging.drift_report import DriftReport, DriftRow, DriftStatus
 from evoclaims.judging.effect import a12, median
 from evoclaims.judging.exact import holm, rank_attainable, two_sided_rank_p
 from evoclaims.judging.joint_test import Columns, detectable_shift, p_by_blocks, permutations_for, places_of
-from evoclaims.judging.sample import UnreadableTrialError, read_number
+from evoclaims.judging.sample import RESOLUTION, UnreadableTrialError, read_number
 from evoclaims.trials.result import TrialResult
 
 MOST: Final = 5
@@ -52,9 +52,6 @@ def _leaves(name: str, value: Any) -> Iterator[tuple[str, str]]:
 
 ALPHA = 0.01
 MIN_REFERENCES = 10
-RESOLUTION = 1e-6
-"""Relative difference up to which two trials' numbers count as equal: eight times the precision of float32."""
-
 LOWER: Final = ("environment_steps", "steps")
 """Measures that are better when they are lower, so that the sum over conditions knows what "better" is."""
 

@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any, Final, Protocol
 
 from evoclaims.core.errors import guess
 from evoclaims.judging.effect import median
 from evoclaims.trials.result import TRAINED_BY, TrialResult
+
+RESOLUTION: Final = 1e-6
+"""Relative difference up to which two trials' numbers count as equal: eight times the precision of float32."""
 
 
 class Source(Protocol):
@@ -182,3 +185,34 @@ def sample(label: str, trials: Sequence[TrialResult], values: Sequence[float]) -
         failed=tuple(trial.seed for trial in failed),
         endings=tuple(trial.status for trial in failed),
     )
+
+
+def alike(value: float, other: float) -> bool:
+    """Whether two numbers are equal but for rounding to single precision: nine of ten episodes are 0.90000004 there.
+
+    Whole numbers are counts, and exact.
+    """
+    if value == other or not (math.isfinite(value) and math.isfinite(other)):
+        return value == other
+    near = abs(value - other) <= RESOLUTION * max(abs(value), abs(other))
+    return near and not (float(value).is_integer() and float(other).is_integer())
+
+
+def beyond(value: float, number: float) -> float:
+    """Return by how much a trial's value is above a number, below it if negative; 0 where they are `alike`."""
+    return 0.0 if alike(value, number) else value - number
+
+
+def levelled(one: Sample, other: Sample) -> tuple[Sample, Sample]:
+    """Return two samples in which values that are `alike` are equal.
+
+    Else a method of the engine would be above or below a training loop or a table wherever both have solved nine of ten
+    episodes.
+    """
+    exact: dict[float, float] = {}
+    last = math.nan
+    for value in sorted({*one.values, *other.values}):
+        exact[value] = exact[last] if alike(last, value) else value
+        last = value
+    first, second = (replace(side, values=tuple(exact[value] for value in side.values)) for side in (one, other))
+    return first, second

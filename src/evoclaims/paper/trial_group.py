@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from evoclaims.core.errors import UnknownNameError, UserError, require_finite, require_known
 from evoclaims.judging.measure import Event, Measure, Profile
 from evoclaims.judging.reading import Better
-from evoclaims.judging.sample import Source, UnreadableTrialError
+from evoclaims.judging.sample import Source, UnreadableTrialError, alike
 from evoclaims.judging.window import Window
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
@@ -57,7 +57,8 @@ def steps_to(source: Source, condition: Condition, curve: str, value: float, lev
     def read(trial: TrialResult) -> float:
         steps = trial.curves[_AXIS]
         reports = zip(steps, trial.curves[curve], _trained_levels(trial, levels), strict=True)
-        first = next((at for at, found, on in reports if on == wanted and found >= value), math.inf)
+        reached = (at for at, found, on in reports if on == wanted and (found >= value or _is(found, value)))
+        first = next(reached, math.inf)
         solved = trial.levels.get("solved_at")
         if curve == "success" and solved and solved[wanted] >= 0.0:
             first = min(first, solved[wanted])
@@ -80,6 +81,11 @@ def steps_to(source: Source, condition: Condition, curve: str, value: float, lev
     # Reports of imported trials are perhaps unevenly far apart, at steps that are no multiples of the longest distance.
     window = Window(budget, float(condition.report_distance), imported, condition.report_steps)
     return Measure(source, name, read, "lower", window, before=before if window.every else None)
+
+
+def _is(found: float, value: float) -> bool:
+    """Whether a number is a value: a whole one exactly, since a level is solved at exactly 1."""
+    return found == value or (not float(value).is_integer() and alike(found, value))
 
 
 def _require_success(label: str, value: float) -> None:
@@ -279,13 +285,14 @@ class TrialGroup:
     def last_success_is(self, value: float) -> Event:
         """The final policy's success on the last level is exactly `value`."""
         _require_success(self.label, value)
-        return self.event(f"success on the last level is {_exact(value)}", lambda t: t.metrics["last_success"] == value)
+        name = f"success on the last level is {_exact(value)}"
+        return self.event(name, lambda t: _is(t.metrics["last_success"], value))
 
     def success_everywhere_is(self, value: float) -> Event:
         """The final policy's success is exactly `value` on every level."""
         _require_success(self.label, value)
         name = "solves every level" if value == 1.0 else f"success is {_exact(value)} on every level"
-        return self.event(name, lambda t: all(x == value for x in t.levels["success"]))
+        return self.event(name, lambda t: all(_is(x, value) for x in t.levels["success"]))
 
 
 def _exact(value: float) -> str:

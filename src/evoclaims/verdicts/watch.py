@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UserError
 from evoclaims.core.packages import Versions, recorded
-from evoclaims.judging.drift import LOWER, MIN_REFERENCES, RESOLUTION, measured
+from evoclaims.judging.drift import LOWER, MIN_REFERENCES, measured
 from evoclaims.judging.e_process import (
     Floats,
     evidence,
@@ -26,7 +26,7 @@ from evoclaims.judging.e_process import (
     uniform,
 )
 from evoclaims.judging.effect import a12, median
-from evoclaims.judging.sample import is_failed
+from evoclaims.judging.sample import RESOLUTION, is_failed
 from evoclaims.paper import references
 from evoclaims.paper.reproduction import Names
 from evoclaims.trials.result import COMPLETE, TrialResult

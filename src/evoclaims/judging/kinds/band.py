@@ -14,7 +14,7 @@ from evoclaims.judging.design import Design
 from evoclaims.judging.effect import median_interval
 from evoclaims.judging.exact import sign_test
 from evoclaims.judging.reading import NumberReading
-from evoclaims.judging.sample import Sample, Trials
+from evoclaims.judging.sample import Sample, Trials, beyond
 from evoclaims.judging.verdict import Bound, Interval, PValues
 
 
@@ -47,7 +47,8 @@ class Band(Assertion):
                 f"{self.hi!r}. Compare the measure with one number (m > 90), or state a bound as an event "
                 "that stays()."
             )
-        self.measure.require_seen(self.hi)
+        for end in (self.lo, self.hi):
+            self.measure.require_seen(end)
 
     def describe(self) -> str:
         """Return "the median of A lies in [lo, hi]"."""
@@ -85,7 +86,7 @@ class Band(Assertion):
         )
 
     def _outside(self, values: Sequence[float]) -> tuple[int, int]:
-        return sum(value < self.lo for value in values), sum(value > self.hi for value in values)
+        return sum(beyond(value, self.lo) < 0 for value in values), sum(beyond(value, self.hi) > 0 for value in values)
 
 
 def _p(below: int, above: int, n: int) -> PValues:

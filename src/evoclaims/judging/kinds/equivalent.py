@@ -12,7 +12,7 @@ from evoclaims.judging.assertion import Assertion, Entry, Finding
 from evoclaims.judging.design import Design
 from evoclaims.judging.exact import ExactTest, rank_attainable, rank_test
 from evoclaims.judging.reading import NumberReading, require_independent
-from evoclaims.judging.sample import Trials
+from evoclaims.judging.sample import Trials, levelled
 from evoclaims.judging.verdict import Bound, PValues
 from evoclaims.judging.window import total
 
@@ -59,7 +59,7 @@ class Equivalent(Assertion):
 
     def find(self, trials: Trials, design: Design, alpha: float) -> Finding:
         """Run the two tests for it and the two against it."""
-        left, right = self.left.sample(trials), self.right.sample(trials)
+        left, right = levelled(self.left.sample(trials), self.right.sample(trials))
         a, b = left.values, right.values
         raised, lowered = _shifted(a, self.margin), _shifted(a, -self.margin)
         inside = equivalence_tests(a, b, self.margin)

@@ -12,7 +12,7 @@ from evoclaims.judging.assertion import Assertion, Entry, Finding
 from evoclaims.judging.design import Design
 from evoclaims.judging.exact import ExactTest, pairs_test, rank_attainable, rank_test
 from evoclaims.judging.reading import NumberReading, require_independent
-from evoclaims.judging.sample import Trials
+from evoclaims.judging.sample import Sample, Trials, levelled
 from evoclaims.judging.verdict import Bound, Outcome, PValues
 
 
@@ -164,11 +164,14 @@ class Greater(Assertion):
         sides = self.above, self.below
         if not all(side.is_shown(trials) for side in sides):
             return tuple(side.spans(trials) for side in sides)
-        return tuple((values, values) for values in (side.sample(trials).values for side in sides))
+        return tuple((sample.values, sample.values) for sample in self._samples(trials))
+
+    def _samples(self, trials: Trials) -> tuple[Sample, Sample]:
+        return levelled(self.above.sample(trials), self.below.sample(trials))
 
     def find(self, trials: Trials, design: Design, alpha: float) -> Finding:
         """Run the tests."""
-        above, below = self.above.sample(trials), self.below.sample(trials)
+        samples = self._samples(trials)
         (least_a, a), (least_b, b) = self._spans(trials)
         tests = GreaterTests(a, b, design.a12_margin, (least_a, least_b))
         detail = (
@@ -178,5 +181,4 @@ class Greater(Assertion):
         if (least_a, least_b) != (a, b):
             detail += "; both sides do not report at the same steps: each p is of the times least favourable to it"
         bounds = (Bound("A12 margin", design.a12_margin, on_axis=False),)
-        samples = (above, below)
         return self.found(tests.p, tests.attainable, alpha, samples, detail=detail, bounds=bounds, effect=True)

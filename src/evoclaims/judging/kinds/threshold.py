@@ -12,7 +12,7 @@ from evoclaims.judging.design import Design
 from evoclaims.judging.exact import sign_test
 from evoclaims.judging.kinds.band import span_of_median
 from evoclaims.judging.reading import NumberReading
-from evoclaims.judging.sample import Sample, Trials
+from evoclaims.judging.sample import Sample, Trials, beyond
 from evoclaims.judging.verdict import Bound, PValues
 
 Side = Literal["above", "below"]
@@ -82,7 +82,7 @@ class Threshold(Assertion):
     def _counts(self, sample: Sample) -> tuple[int, int]:
         """Return how many trials count for the claim, and how many against it."""
         sign = 1 if self.side == "above" else -1
-        distances = [sign * (value - self.number) for value in sample.values]
+        distances = [sign * beyond(value, self.number) for value in sample.values]
         toward = sum(
             distance > 0 and seed not in sample.failed for seed, distance in zip(sample.seeds, distances, strict=True)
         )

@@ -12,7 +12,7 @@ from evoclaims.judging.assertion import Assertion, Entry, Finding
 from evoclaims.judging.design import Design
 from evoclaims.judging.kinds.threshold import sign_tests
 from evoclaims.judging.reading import LevelsReading
-from evoclaims.judging.sample import Trials
+from evoclaims.judging.sample import Trials, beyond
 from evoclaims.judging.verdict import PValues
 
 Slope = Literal["falls", "rises"]
@@ -22,7 +22,8 @@ _SIGNS: dict[Slope, int] = {"falls": -1, "rises": 1}
 
 def kendall_s(profile: Sequence[float]) -> int:
     """Return Kendall's S of values against their index: pairs of them that rise, less pairs that fall."""
-    return sum((later > earlier) - (later < earlier) for earlier, later in combinations(profile, 2))
+    steps = [beyond(later, earlier) for earlier, later in combinations(profile, 2)]
+    return sum(step > 0 for step in steps) - sum(step < 0 for step in steps)
 
 
 @dataclass(frozen=True)
