@@ -99,6 +99,15 @@ def test_nothing_is_asserted_beyond_what_is_observed(source) -> None:
     assert judge(a.never_above_itself(), FIXED_10).outcome is SUPPORTED
 
 
+def test_a_number_between_two_reports_is_refused_since_trials_on_both_sides_of_it_look_alike(source) -> None:
+    a = until(source, "a", [22.0] * 10, Window(70.0, 20.0))  # of an exact 22 a report at 40 tells
+    for assertion in (lambda: a > 30, lambda: a < 30, lambda: a.between(30, 60), lambda: a.between(20, 30)):
+        with pytest.raises(UserError, match="known to multiples of 20, .* nothing about 30. Name 20 or 40, or let"):
+            assertion()
+    assert judge(a < 60, FIXED_10).outcome is judge(a > 20, FIXED_10).outcome is SUPPORTED
+    assert judge(a.between(0, 70), FIXED_10).outcome is SUPPORTED  # the budget's end is seen
+
+
 def test_the_interval_of_a_median_says_where_observation_ends(source) -> None:
     a = until(source, "a", [10.0] * 5 + [99.0] * 5, Window(80.0))
     (interval,) = judge(a < 50, FIXED_10).evidence[0].intervals

@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Any, Literal, Self, TypeVar, get_args
+from typing import Any, Final, Literal, Self, TypeVar, get_args
 
 import numpy as np
 
@@ -27,6 +27,9 @@ from evoclaims.judging.window import EVERYTHING, Window, shared
 from evoclaims.trials.result import TrialResult
 
 Better = Literal["higher", "lower"]
+
+_ROUNDING: Final = 1e-9
+"""A share of the distance between reports that numbers may be off by."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,15 +121,22 @@ class NumberReading(ScalarReading):
         return self if window == self.window else replace(self, window=window)
 
     def require_seen(self, number: float) -> None:
-        """Reject an assertion about a number beyond what is observed.
+        """Reject an assertion about a number beyond what is observed, or between two values that are told apart.
 
         Raises:
-            UserError: when there is a limit, and the number is above it.
+            UserError: when there is a limit, and the number is above it; or when it lies between two multiples.
         """
         if number > self.window.limit:
             raise UserError(
                 f"{self.describe()!r} is not observed beyond that, so trials show nothing about "
                 f"{number:,.12g}. Name a smaller number, or raise the budget."
+            )
+        every, above = self.window.every, self.window.seen(number)
+        if number > 0 and above - number > _ROUNDING * every:  # a trial below the number may count as one above it
+            raise UserError(
+                f"{self.describe()!r} is known to multiples of {every:,.12g}, so trials show nothing about "
+                f"{number:,.12g}. Name {math.floor(number / every) * every:,.12g} or {above:,.12g}, or let trials have "
+                "more reports."
             )
 
     def sample(self, trials: Trials) -> Sample:
