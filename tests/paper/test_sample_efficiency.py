@@ -24,9 +24,11 @@ from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.paper.trial_group import TrialGroup
 from evoclaims.trials.imported import Imported
+from evoclaims.trials.loop_messages import Trained
+from evoclaims.trials.loop_trials import trained_record
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.runner import run
-from evoclaims.trials.spec import Budget, Condition
+from evoclaims.trials.spec import Budget, Condition, TrialSpec
 from evoclaims.trials.store import Store
 
 PLAIN = CONDITIONS["better", "small"]
@@ -77,6 +79,15 @@ def test_it_is_the_first_report_with_the_value_and_never_is_beyond_the_budget(gr
     assert measure.better == "lower"
     within = f", within {4 * COST:,}"
     assert measure.describe() == f"better on small: environment steps until success is 0.9 on level {LAST}{within}"
+
+
+def test_a_share_is_reached_whatever_its_rounding_but_a_level_is_solved_at_exactly_1(group: Any) -> None:
+    seven_of_ten, nearly = 0.699999988079071, 0.9999999403953552  # in single precision
+    trials = group([0.0, seven_of_ten, nearly, 1.0])
+    assert (read(trials, 0.7), read(trials, 1.0)) == ((2 * COST,), (4 * COST,))
+    trial = trial_of(trials.condition, 0, seven_of_ten)
+    assert [trials.last_success_is(value).of(trial) for value in (0.7, 0.70001)] == [1.0, 0.0]
+    assert trials.solves_every_level.of(trial_of(trials.condition, 0, nearly)) == 0.0
 
 
 def test_only_reports_on_the_level_count(group: Any) -> None:
@@ -285,3 +296,25 @@ def test_a_loop_whose_reports_lie_elsewhere_is_no_slower_one(every: int, reached
         groups.append(TrialGroup(name, "small", condition, lambda asked, seeds, mine=tuple(trials): mine[: len(seeds)]))
     ours, theirs = (group.steps_to("fitness", 1) for group in groups)
     assert judge(ours < theirs, Design.fixed(10)).outcome is outcome
+
+
+def test_generations_of_a_training_loop_are_no_environment_steps(group: Any) -> None:
+    loop = TrainingLoop("its_loops:train", packages=())
+    condition = replace(PLAIN, method=loop, budget=Budget(generations=4, reports=4), progression="whole_budget")
+    its, ours = TrialGroup("its", "small", condition, lambda *_: []), group(FAST)
+    curves = {"environment_steps": (1.0, 2.0, 4.0), "success": (0.0, 1.0, 1.0), "level": (float(LAST),) * 3}
+
+    def made_by_it(**returned: float) -> TrialResult:
+        trained = Trained({"last_success": 1.0, **returned}, None, 4)
+        return trained_record(TrialSpec(condition, 0), loop, trained, curves, {}, jax.devices()[:1])
+
+    measure = its.steps_to("success", 1.0)
+    assert measure.describe() == f"its on small: generations until success is 1 on level {LAST}, within 4"
+    assert measure.of(made_by_it()) == 2
+    with pytest.raises(UnreadableTrialError, match=r"\(in environment steps\).* \(in generations\) are not"):
+        (ours.steps_to("success", 1.0) > measure).below.of(made_by_it())
+    for steps in (its.environment_steps, its.measure("environment_steps", better="lower")):
+        with pytest.raises(UnreadableTrialError, match="its_loops:train has a budget in generations, and returned no"):
+            steps.of(made_by_it())
+        assert steps.of(made_by_it(environment_steps=800)) == 800
+    assert its.measure("steps").of(made_by_it()) == its.measure("steps").of(made_by_it(environment_steps=800)) == 4

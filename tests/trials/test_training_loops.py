@@ -26,8 +26,9 @@ from evoclaims.envs.gates.parity import NParity
 from evoclaims.judging.sample import UnreadableTrialError, checked
 from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.trials import failed, loop_trials
+from evoclaims.trials.loop_messages import Trained
 from evoclaims.trials.loop_process import Reporter, actions_of
-from evoclaims.trials.loop_trials import Child
+from evoclaims.trials.loop_trials import Child, trained_record
 from evoclaims.trials.progress import RunProgress
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.runner import run
@@ -72,6 +73,25 @@ def test_reading_a_number_that_the_loop_has_not_returned_says_so(all_ends: Any) 
         _ = good.metrics["last_success"]
     with pytest.raises(UnreadableTrialError, match=f"^{loop} returned no policy, .* shows 'success' for {trial}"):
         _ = good.levels["success"]
+
+
+@pytest.mark.parametrize(
+    ("returned", "furthest"),
+    [
+        ({}, math.nan),
+        ({"last_success": 0.5}, math.nan),  # of the first level nothing is known
+        ({"last_success": 1.0}, 1.0),
+        ({"last_success": 0.5, "furthest_solved": 0.0}, 0.0),
+    ],
+)
+def test_without_a_policy_no_level_counts_as_unsolved_that_nobody_has_examined(
+    returned: dict[str, float], furthest: float, cpus: list[Any]
+) -> None:
+    of_two_levels = condition(toy_loops.in_every_way, NParity(3))
+    loop = of_two_levels.loop
+    assert loop is not None
+    trial = trained_record(TrialSpec(of_two_levels, 0), loop, Trained(returned, None, None), {}, {}, cpus)
+    assert trial.metrics["furthest_solved"] == pytest.approx(furthest, nan_ok=True)
 
 
 def test_what_is_reported_becomes_curves_of_as_many_points_as_the_budget_says(all_ends: Any) -> None:

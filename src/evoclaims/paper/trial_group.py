@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from evoclaims.core.errors import UnknownNameError, UserError, require_finite, require_known
@@ -12,7 +13,7 @@ from evoclaims.judging.measure import Event, Measure, Profile
 from evoclaims.judging.reading import Better
 from evoclaims.judging.sample import Source, UnreadableTrialError, alike
 from evoclaims.judging.window import Window
-from evoclaims.trials.result import TrialResult
+from evoclaims.trials.result import RETURNED, TRAINED_BY, TrialResult
 from evoclaims.trials.spec import Condition
 
 _AXIS = "environment_steps"
@@ -21,9 +22,10 @@ _AXIS = "environment_steps"
 def steps_to(source: Source, condition: Condition, curve: str, value: float, level: int | None = None) -> Measure:
     """Return the environment steps at the first report in which a curve is at least `value` on a level.
 
-    A trial that spends its budget without it is censored there: its number is only known to be larger. Where several
-    steps of the method lie between two reports, numbers are known to multiples of these. A level that is solved between
-    two reports has reached success 1.
+    Of a training loop with a budget in generations, which its reports count, return these. A trial that spends its
+    budget without it is censored there: its number is only known to be larger. Where several steps of the method lie
+    between two reports, numbers are known to multiples of these. A level that is solved between two reports has reached
+    success 1.
 
     Args:
         source: the trials.
@@ -46,7 +48,10 @@ def steps_to(source: Source, condition: Condition, curve: str, value: float, lev
     imported = bool(condition.existing)
     advice = "" if imported else "give the condition the progression 'whole_budget', or "
     every = max(condition.report_distance, 1)
-    name = f"environment steps until {curve} is {float(value):.12g}" + f" on level {wanted}" * (levels > 1)
+    counted = "environment steps"
+    if condition.loop and condition.budget.generations is not None:
+        counted = "generations"  # it reports in its budget's unit
+    name = f"{counted} until {curve} is {float(value):.12g}" + f" on level {wanted}" * (levels > 1)
 
     def last_before(trial: TrialResult, step: float) -> float:
         return max((at for at in trial.curves[_AXIS] if at < step), default=0.0)
@@ -65,7 +70,7 @@ def steps_to(source: Source, condition: Condition, curve: str, value: float, lev
         if math.isinf(first) and max(steps, default=0.0) < budget:
             raise UnreadableTrialError(
                 f"The trial of seed {trial.seed_in_words} of {source.label} ended after "
-                f"{max(steps, default=0.0):,.12g} of {budget:,.12g} environment steps with {curve!r} below {value:g}, "
+                f"{max(steps, default=0.0):,.12g} of {budget:,.12g} {counted} with {curve!r} below {value:g}, "
                 "and nobody knows when it would have reached that: "
                 f"{advice}ask for a value that ended trials have reached"
             )
@@ -73,19 +78,35 @@ def steps_to(source: Source, condition: Condition, curve: str, value: float, lev
         if condition.loop and first - last > 2 * every and not math.isinf(first):  # it reports when it likes
             raise UnreadableTrialError(
                 f"The trial of seed {trial.seed_in_words} of {source.label} reports nothing between {last:,.12g} and "
-                f"{first:,.12g} environment steps, where {curve!r} reaches {value:g}, and its budget has reports "
+                f"{first:,.12g} {counted}, where {curve!r} reaches {value:g}, and its budget has reports "
                 f"{every:,} apart: call report(...) as often, or give all compared conditions fewer reports"
             )
         return first
 
     # Reports of imported trials are perhaps unevenly far apart, at steps that are no multiples of the longest distance.
     window = Window(budget, float(condition.report_distance), imported, condition.report_steps)
-    return Measure(source, name, read, "lower", window, before=before if window.every else None)
+    return Measure(source, name, read, "lower", window, f"in {counted}", before=before if window.every else None)
 
 
 def _is(found: float, value: float) -> bool:
     """Whether a number is a value: a whole one exactly, since a level is solved at exactly 1."""
     return found == value or (not float(value).is_integer() and alike(found, value))
+
+
+def _metric(name: str, trial: TrialResult) -> float:
+    """Return a metric of a finished trial.
+
+    Raises:
+        UnreadableTrialError: when a training loop has counted generations, and environment steps are asked for.
+    """
+    made: Mapping[str, Any] = getattr(trial, "provenance", {})  # what stands for a trial may have numbers alone
+    if name == _AXIS and not made.get(RETURNED, {}).get("counts_steps", True):
+        raise UnreadableTrialError(
+            f"The training loop {made[TRAINED_BY]} has a budget in generations, and returned no {name!r} "
+            f"for the trial of seed {trial.seed_in_words}. Let it return them, or compare its measure('steps', "
+            "better='lower') with that of another such loop"
+        )
+    return trial.metrics[name]
 
 
 def _require_success(label: str, value: float) -> None:
@@ -193,7 +214,7 @@ class TrialGroup:
         """
         if read is None and self.condition.existing:
             require_known(f"metric of {self.label}", name, self.condition.existing[0].metrics)
-        return Measure(self, name, read or (lambda t: t.metrics[name]), better, unit=unit)
+        return Measure(self, name, read or partial(_metric, name), better, unit=unit)
 
     def event(self, name: str, holds: Callable[[TrialResult], bool], **numbers: float) -> Event:
         """A custom event, such as `event("is fast", lambda t: t.metrics["steps"] < 100)`.
@@ -238,7 +259,7 @@ class TrialGroup:
     @property
     def environment_steps(self) -> Measure:
         """Environment steps that the trial has spent: fewer than the budget if it ended early."""
-        return self.measure("environment steps", lambda t: t.metrics["environment_steps"], "lower")
+        return self.measure("environment steps", partial(_metric, _AXIS), "lower")
 
     def steps_to(self, curve: str, value: float, level: int | None = None) -> Measure:
         """Environment steps at the first report at which a training curve has at least `value`.
@@ -285,8 +306,9 @@ class TrialGroup:
     def last_success_is(self, value: float) -> Event:
         """The final policy's success on the last level is exactly `value`."""
         _require_success(self.label, value)
-        name = f"success on the last level is {_exact(value)}"
-        return self.event(name, lambda t: _is(t.metrics["last_success"], value))
+        return self.event(
+            f"success on the last level is {_exact(value)}", lambda t: _is(t.metrics["last_success"], value)
+        )
 
     def success_everywhere_is(self, value: float) -> Event:
         """The final policy's success is exactly `value` on every level."""

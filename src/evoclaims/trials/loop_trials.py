@@ -144,16 +144,18 @@ def trained_record(
         levels = {name: (*unknown, returned.get(f"last_{name}", math.nan)) for name in ("success", "fitness")}
     else:
         levels = {"success": scores.success, "fitness": scores.fitness}
-    steps = returned.get("environment_steps", spec.condition.steps if trained.step is None else trained.step)
+    reported = spec.condition.steps if trained.step is None else trained.step
+    steps, in_generations = returned.get("environment_steps", reported), spec.condition.budget.generations is not None
     success = levels["success"]
-    solved = [level for level, value in enumerate(success) if value == 1.0]
+    solved = [level for level, value in enumerate(success) if value == 1.0 or math.isnan(value)]
+    furthest = max(solved, default=-1)  # unknown where a level above the solved ones is
     metrics = {
         "mean_success": math.fsum(success) / len(success),
         "last_success": success[-1],
         "last_fitness": levels["fitness"][-1],
-        "furthest_solved": math.nan if math.isnan(success[-1]) else float(max(solved, default=-1)),
+        "furthest_solved": math.nan if solved and math.isnan(success[furthest]) else float(furthest),
         "furthest_reached": math.nan,
-        "steps": float(returned.get("steps", steps)),
+        "steps": float(returned.get("steps", reported if in_generations else steps)),
         "environment_steps": float(steps),
     }
     if scores is None:
@@ -169,6 +171,7 @@ def trained_record(
             "metrics": content_hash(dict(returned)),
             "actions": trained.actions,
             "graded": trained.graded,
+            "counts_steps": "environment_steps" in returned or not in_generations,
         },
     }
     return make_record(spec, status, metrics, levels, curves, b"", timing, devices, origin)

@@ -19,7 +19,8 @@ TRAINED_BY: Final = "trained_by"
 """Key of the provenance of a training loop's trial: the place of its function, "module:name"."""
 RETURNED: Final = "returned"
 """Key of the same: hashes of the "metrics" that its function returned and of its policy's "actions" on fixed starts
-(empty without a policy), and whether some action is "graded", no whole number."""
+(empty without a policy), whether some action is "graded", no whole number, and whether the trial "counts_steps" of the
+environment, and not generations alone."""
 
 
 @dataclass(frozen=True)
