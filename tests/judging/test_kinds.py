@@ -351,6 +351,12 @@ def test_rounding_to_single_precision_decides_nothing(source: Any, values: float
     assert judge(claim(*measures), FIXED_10).outcome is outcome
 
 
+def test_a_chain_of_neighbours_that_are_alike_makes_numbers_far_apart_no_equals(source: Any) -> None:
+    chain = [0.5 * (1 + 8e-7) ** k for k in range(20)]
+    low, high = source("a", chain[:10]).score(), source("b", chain[10:]).score()
+    assert judge(high > low, FIXED_10).outcome is SUPPORTED
+
+
 @pytest.mark.parametrize(("n", "alpha"), [(5, 0.05), (6, 0.05), (7, 0.01)])
 @pytest.mark.parametrize("at", [0.0, 0.1, 0.5])
 def test_no_median_at_the_number_is_called_above_or_below_more_often_than_alpha(

@@ -210,9 +210,8 @@ def levelled(one: Sample, other: Sample) -> tuple[Sample, Sample]:
     episodes.
     """
     exact: dict[float, float] = {}
-    last = math.nan
+    least = math.nan  # of those that are alike: neighbours that are would let numbers far apart be equal
     for value in sorted({*one.values, *other.values}):
-        exact[value] = exact[last] if alike(last, value) else value
-        last = value
+        least = exact[value] = least if alike(least, value) else value
     first, second = (replace(side, values=tuple(exact[value] for value in side.values)) for side in (one, other))
     return first, second
