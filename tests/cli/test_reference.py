@@ -27,6 +27,16 @@ def test_reference_commits_the_trials_of_every_condition_that_has_enough(evoclai
     assert not references.path_of(Path.cwd() / "reference", "smoke", "wrong", "parity").exists()
 
 
+def test_trials_of_null_agents_are_committed_too(evoclaims: Evoclaims, project: Project) -> None:
+    paper = project.path / "tiny_paper.py"
+    agents = "NullAgent('a toss', method='coin'), NullAgent('nobody', method='absent')"
+    more = f"from evoclaims.paper.reproduction import NullAgent\nAGENTS = dict(enumerate([{agents}]))\n"
+    paper.write_text(f"{paper.read_text()}\n{more}REPRODUCTION = replace(REPRODUCTION, null_agents=AGENTS)\n")
+    evoclaims("run", "coin")
+    assert evoclaims("reference", "--unknown-revision")[0] == 0
+    assert [path.name for path in Path("reference/smoke").iterdir()] == ["coin-parity.jsonl"]
+
+
 def test_reference_takes_the_trials_of_a_look_and_never_fewer_than_are_committed(
     evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch
 ) -> None:

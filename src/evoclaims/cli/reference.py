@@ -12,6 +12,7 @@ from evoclaims.core.printable import printable
 from evoclaims.judging.drift import MIN_REFERENCES
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper import references
+from evoclaims.paper.reproduction import Names, Reproduction, Tier
 from evoclaims.trials.failed import is_final
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import TrialSpec
@@ -31,17 +32,17 @@ def main(options: argparse.Namespace) -> int:
     for report in reports:
         if report.outcome is Outcome.ERROR and not report.sources:  # such as a damaged record: what it reads is unknown
             print(printable(f"left alone: what {report.name} alone reads, which is error now: {report.reason}"))
-    used = sorted({(source.method, source.task) for report in reports for source in report.sources})
+    used = sorted(_with_null_agents(reproduction, tier, {(s.method, s.task) for r in reports for s in r.sources}))
     if options.variant:
         changes = reproduction.changed_by(options.variant, options.tier)
         used = [names for names in used if names in changes]
     # A claim is judged after each look; the drift check needs MIN_REFERENCES trials.
     looks = [look.n for look in tier.design.looks[:-1]]
     third = {
-        (source.method, source.task): report.attainable[-1].n
+        names: report.attainable[-1].n
         for report in reports
-        for source in report.sources
         if report.attainable and report.attainable[-1].n > tier.design.last.n
+        for names in _with_null_agents(reproduction, tier, {(s.method, s.task) for s in report.sources})
     }
     written, shared, unknown = 0, 0, list[str]()
     for method, task in used:
@@ -105,6 +106,12 @@ def main(options: argparse.Namespace) -> int:
             f"them first with `evoclaims run --tier {options.tier}{named}{project.store.option}`."
         )
     return 0
+
+
+def _with_null_agents(reproduction: Reproduction, tier: Tier, used: set[Names]) -> set[Names]:
+    """Return conditions of claims, and of the null agents with trials of their own that these are put to."""
+    agents = {agent.method for agent in reproduction.null_agents.values()}
+    return used | {names for names in tier.conditions if names[0] in agents and names[1] in {task for _, task in used}}
 
 
 def _is_of_unknown_revision(trial: TrialResult) -> bool:
