@@ -86,7 +86,7 @@ def test_c(trials, verdict):
     assert lines == [
         "| claim | the paper says | small | smoke, traded | full |",
         "| --- | --- | --- | --- | --- |",
-        "| a | A, in short | ✓1 ✗1 | ✗ | – |",
+        "| a | A, in short | ✓1 ✗1 –1 | ✗1 –2 | – |",
     ]
     Path("page.md").write_text(MARKS.replace("| a | A, in short |\n", ""))
     committed("tables", "page.md")

@@ -20,6 +20,7 @@ import numpy as np
 
 from evoclaims.core.canonical import as_plain, content_hash, is_own
 from evoclaims.core.errors import PACKAGE_FOLDERS
+from evoclaims.core.files import read_file
 from evoclaims.core.foreign import Later
 
 CODE: Final = "code_hashes"
@@ -98,7 +99,7 @@ def _at(component: Any) -> Any:
             return found if inspect.isfunction(found) or inspect.isclass(found) else None
         if module not in _TEXTS:  # to look for a module imports its package, which of installed ones may take long
             foreign = _is_installed(_file_of(module.partition(".")[0]))
-            tree = None if foreign else _as_lists(_without_words(ast.parse(_file_of(module).read_bytes())))
+            tree = None if foreign else _as_lists(_without_words(ast.parse(read_file(_file_of(module)))))
             _TEXTS[module] = tree and (module, content_hash(tree)[:DIGITS])
         return _TEXTS[module]
     except Exception:  # there is no such thing, which is told where it is used; or its package is broken
@@ -341,10 +342,9 @@ def _tree(one: Any) -> ast.Module:
 def _without_words(tree: ast.Module) -> ast.Module:
     """Return code without its docstrings."""
     for node in ast.walk(tree):
-        if not isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
-            continue
-        if ast.get_docstring(node) is not None:
-            node.body = node.body[1:] or [ast.Pass()]
+        match node:
+            case ast.Module() | ast.ClassDef() | ast.FunctionDef() | ast.AsyncFunctionDef():
+                node.body = node.body[ast.get_docstring(node) is not None :] or [ast.Pass()]
     return tree
 
 
