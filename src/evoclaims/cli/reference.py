@@ -110,8 +110,8 @@ def main(options: argparse.Namespace) -> int:
 
 def _with_null_agents(reproduction: Reproduction, tier: Tier, used: set[Names]) -> set[Names]:
     """Return conditions of claims, and of the null agents with trials of their own that these are put to."""
-    agents = {agent.method for agent in reproduction.null_agents.values()}
-    return used | {names for names in tier.conditions if names[0] in agents and names[1] in {task for _, task in used}}
+    agents, tasks = {agent.method for agent in reproduction.null_agents.values()}, {task for _, task in used}
+    return used | {(method, task) for method, task in tier.conditions if method in agents and task in tasks}
 
 
 def _is_of_unknown_revision(trial: TrialResult) -> bool:

@@ -102,7 +102,7 @@ def _at(component: Any) -> Any:
             tree = None if foreign else _as_lists(_without_words(ast.parse(read_file(_file_of(module)))))
             _TEXTS[module] = tree and (module, content_hash(tree)[:DIGITS])
         return _TEXTS[module]
-    except Exception:  # there is no such thing, which is told where it is used; or its package is broken
+    except Exception:  # there is no such thing, an error where it is used; or its package is broken
         return None
 
 

@@ -121,7 +121,7 @@ class NumberReading(ScalarReading):
         return self if window == self.window else replace(self, window=window)
 
     def require_seen(self, number: float) -> None:
-        """Reject an assertion about a number beyond what is observed, or between two values that are told apart.
+        """Reject an assertion about a number beyond what is observed, or between two multiples.
 
         Raises:
             UserError: when there is a limit, and the number is above it; or when it lies between two multiples.

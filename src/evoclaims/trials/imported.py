@@ -16,7 +16,7 @@ from evoclaims.core.provenance import version_of
 from evoclaims.trials.result import Status, TrialResult, check_shares, check_success, digest
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import Store
-from evoclaims.trials.table_file import TableFile, read_table
+from evoclaims.trials.table_file import TableFile, exact, read_table
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class TrialRows:
                     "whole number."
                 )
         cells = self.table.column(self.seed, "the seeds")
-        return [_whole(cells[row], seed) for row, seed in zip(self.chosen, found, strict=True) if seed is not None]
+        return [int(exact(cells[row])) for row in self.chosen]
 
     def _in_order(self, seed: int, rows: list[int]) -> list[int]:
         if not self.step:
@@ -98,14 +98,6 @@ class TrialRows:
                     f"{following + 1}): if there are several trials of a seed, choose by where={{column: value}}."
                 )
         return ordered
-
-
-def _whole(cell: Any, number: float) -> int:
-    """Return the whole number in a cell that `number` is nearest to: a float has not the digits of large seeds."""
-    try:
-        return int(cell)
-    except ValueError:  # 1e3, 7.0
-        return int(number)
 
 
 REVISION: Final = 1

@@ -99,7 +99,7 @@ class TableFile:
         try:
             if not isinstance(cell, bool) and "_" not in str(cell):  # Python alone takes 1_0 for ten
                 number = float(cell)
-                if not rounded and abs(number) >= 2**53 and not isinstance(cell, float) and _is_inexact(cell, number):
+                if not rounded and abs(number) >= 2**53 and not isinstance(cell, float) and exact(cell) != number:
                     raise UserError(
                         f"{self.name} holds {cell} in row {row + 1} of the column {name!r}, a whole number beyond 2^53 "
                         "that no float holds exactly: different values would count as equal. Subtract a constant, or "
@@ -147,22 +147,14 @@ def _is(cell: Any, value: object) -> bool:
     if isinstance(value, bool) and str(cell).lower() == str(value).lower():
         return True
     try:
-        return isinstance(value, int | float) and _exact(cell) == value
+        return isinstance(value, int | float) and exact(cell) == value
     except (TypeError, ValueError):
         return False
 
 
-def _exact(cell: Any) -> int | float:
+def exact(cell: Any) -> int | float:
     """Return the number in a cell; of a whole one all digits, which a float has not."""
     try:
         return int(str(cell))
     except ValueError:  # 1e3, 7.0, True
         return float(cell)
-
-
-def _is_inexact(cell: Any, number: float) -> bool:
-    """Whether a cell holds a whole number other than the float nearest to it."""
-    try:
-        return int(str(cell)) != number
-    except ValueError:  # 1e300, which is written as a float
-        return False
