@@ -336,6 +336,12 @@ class RobotTask(ABC):
         return jnp.concatenate(parts)
 
 
+def limbs_of(scene: Scene, state: TaskState) -> list[list[Any]]:
+    """Return a state's numbers that belong to each of the robot's limbs (`Scene.limbs`), in the same order."""
+    body = state.inner.body
+    return [[*body.position[at], *body.velocity[moving], *body.acceleration[moving]] for at, moving in scene.limbs]
+
+
 @lru_cache(maxsize=64)
 def _start_kernel(task: RobotTask) -> Callable[[Array, Array, Places], TaskState]:
     """Return a task's start, with its boxes' places as an argument."""
@@ -349,5 +355,7 @@ def _start_kernel(task: RobotTask) -> Callable[[Array, Array, Places], TaskState
 def _step_kernel(task: RobotTask) -> Callable[[TaskState, Array, Places], TaskState]:
     """Return a task's step, with its boxes' places as an argument."""
     return one_kernel(
-        lambda state, action, places: task.with_numbers(places).plain_step(state, action), f"A step of {task.name}"
+        lambda state, action, places: task.with_numbers(places).plain_step(state, action),
+        f"A step of {task.name}",
+        parts=lambda state, action, places: limbs_of(task.scene, state),
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
@@ -183,6 +184,23 @@ class Scene:
     def seconds(self) -> float:
         """Simulated time of one environment step."""
         return float(self.model.opt.timestep) * self.robot.frames
+
+    @cached_property
+    def limbs(self) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+        """The places in qpos and qvel of four or more limbs of the torso that have the same joints; else empty."""
+        model, alike = self.model, defaultdict(list)
+        single = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
+        for first in np.flatnonzero(model.body_parentid == 1):  # the torso's
+            bodies = {int(first)}
+            for body in range(first + 1, model.nbody):
+                if int(model.body_parentid[body]) in bodies:
+                    bodies.add(body)
+            joints = np.flatnonzero(np.isin(model.jnt_bodyid, list(bodies)))
+            if np.isin(model.jnt_type[joints], single).all():
+                limb = model.jnt_qposadr[joints].astype(np.int64), model.jnt_dofadr[joints].astype(np.int64)
+                alike[tuple(model.jnt_type[joints])].append(limb)
+        limbs = max(alike.values(), key=len, default=[])
+        return limbs if len(limbs) in (4, 8, 16, 32) and len(limbs[0][0]) else []
 
     @cached_property
     def turns(self) -> Places:

@@ -66,7 +66,7 @@ def on_gpu(program: GpuProgram, operands: Sequence[Array], shapes: Shapes, eleme
         name=program.name,
         kernel_type="ptx",
         kernel_data=program.ptx,
-        grid_x=np.int32(-(-elements // (gpu_kernel.BLOCK * program.teams))),
+        grid_x=np.int32(-(-elements * program.parts // (gpu_kernel.BLOCK * program.teams))),
         grid_y=one,
         grid_z=one,
         block_x=np.int32(gpu_kernel.BLOCK),

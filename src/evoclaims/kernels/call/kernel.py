@@ -13,17 +13,21 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax.extend.core import jaxpr_as_fun
 from jaxtyping import Array
 
 from evoclaims.kernels.call import calls
-from evoclaims.kernels.emit import block_kernel, gpu_kernel, host_kernel, llvm_ir, machine_code
+from evoclaims.kernels.emit import block_kernel, gpu_kernel, host_kernel, llvm_ir, machine_code, part_kernel
 from evoclaims.kernels.emit.llvm_ir import ArrayRow
+from evoclaims.kernels.emit.parts import WORTHWHILE, Parts, Place
 from evoclaims.kernels.trace.expressions import Input, Unsupported, everything
 from evoclaims.kernels.trace.interpreter import Numbers
 from evoclaims.kernels.trace.scalarize import scalarize
 
 Shapes = tuple[jax.ShapeDtypeStruct, ...]
+Parting = Callable[..., Sequence[Sequence[Place]]]
+"""Gets arguments with `Place`s for numbers; returns those that belong to each part, in the same order."""
 
 
 class Kernel:
@@ -36,13 +40,16 @@ class Kernel:
         structure: its results' tree.
     """
 
-    def __init__(self, function: Callable[..., Any], name: str, treedef: Any, shapes: Shapes) -> None:
-        """Trace the function once."""
+    def __init__(
+        self, function: Callable[..., Any], name: str, treedef: Any, shapes: Shapes, parts: Parting | None = None
+    ) -> None:
+        """Trace the function once; for `parts` see `one_kernel`."""
         self.name = name
         self.shapes = shapes
         self._traced, shape = jax.make_jaxpr(function, return_shape=True)(*jax.tree.unflatten(treedef, shapes))
         self.outputs: Shapes = tuple(jax.ShapeDtypeStruct(x.shape, x.dtype) for x in jax.tree.leaves(shape))
         self.structure = jax.tree.structure(shape)
+        self._parts = [] if parts is None else parts(*jax.tree.unflatten(treedef, _places(shapes)))
         self._gpu_programs: dict[tuple[int, tuple[int, ...]], gpu_kernel.GpuProgram] = {}
 
     @cached_property
@@ -60,6 +67,16 @@ class Kernel:
     def results(self) -> list[Numbers]:
         """The expressions of the numbers of each result."""
         return scalarize(self._traced)
+
+    @property
+    def _packed(self) -> tuple[Parts, list[Numbers]] | None:
+        """The operations that are alike in all parts, and the results, if there are enough of them."""
+        if not self._parts:
+            return None
+        made = scalarize(self._traced, mirrors=True)
+        results = [made[i] for i in self.written]
+        parts = Parts([n for r in results for n in r.flat], self._parts)
+        return (parts, results) if parts.share() <= WORTHWHILE else None
 
     @cached_property
     def written(self) -> list[int]:
@@ -132,8 +149,12 @@ class Kernel:
         """Return the kernel for NVIDIA's GPUs: for how many elements, how many of which share a row of each array."""
         if (rows, shared) not in self._gpu_programs:  # a legged robot's takes seconds
             results, given = [self.results[i] for i in self.written], dict(zip(self.read, shared, strict=True))
-            shape = block_kernel.chosen(results, rows)
-            if shape is None:
+            packed = self._packed
+            shape = None if packed else block_kernel.chosen(results, rows)
+            if packed:
+                text = part_kernel.text(*packed, self.read, given, rows)
+                made = gpu_kernel.program(text, self.name, parts=packed[0].count)
+            elif shape is None:
                 made = gpu_kernel.program(gpu_kernel.text(results, self.read, given, rows), self.name)
             else:
                 text = block_kernel.text(shape, results, self.read, given, rows)
@@ -162,7 +183,16 @@ class Kernel:
         return results
 
 
-def one_kernel(function: Callable[..., Any], name: str) -> Callable[..., Any]:
+def _places(shapes: Shapes) -> list[Any]:
+    """Return arrays with the `Place` of each number."""
+    arrays = [np.empty(math.prod(shape.shape), object) for shape in shapes]
+    for at, array in enumerate(arrays):
+        for place in range(array.size):
+            array[place] = (at, place)
+    return [array.reshape(shape.shape) for array, shape in zip(arrays, shapes, strict=True)]
+
+
+def one_kernel(function: Callable[..., Any], name: str, parts: Parting | None = None) -> Callable[..., Any]:
     """Return `function`, run as one kernel on processors and NVIDIA's GPUs.
 
     It may be batched, any number of times; derivatives are those of the function itself. If it cannot be one kernel
@@ -171,11 +201,13 @@ def one_kernel(function: Callable[..., Any], name: str) -> Callable[..., Any]:
     Args:
         function: takes trees of small arrays (float32, int32, bool); pure.
         name: what it computes, for the warning and for profilers.
+        parts: which numbers of the arguments belong to parts that are alike: 2, 4, 8, 16 or 32. On a GPU each then has
+            a thread of its own, if enough is alike.
     """
 
     @cache
     def kernel(treedef: Any, shapes: Shapes) -> Kernel:
-        return Kernel(function, name, treedef, shapes)
+        return Kernel(function, name, treedef, shapes, parts)
 
     def run(*arguments: Any) -> Any:
         leaves, treedef = jax.tree.flatten(arguments)

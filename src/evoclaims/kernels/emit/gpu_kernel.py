@@ -63,11 +63,12 @@ class Element:
         """Forget all addresses."""
         self._addresses.clear()
 
-    def load(self, number: Input) -> str:
-        """Return the register with a number that is read."""
+    def load(self, number: Input, place: str = "") -> str:
+        """Return the register with a number that is read: this one, or of the same array that at `place`, an i32."""
         kind, page, shared = number.dtype.kind, self._page, self._shared[number.array]
         address = self._address(f"%a{number.array}", self._arrays[number.array].size, kind, shared)
-        where = page.put(f"getelementptr {STORED[kind]}, ptr addrspace(1) {address}, i64 {number.place}")
+        at = f"i32 {place}" if place else f"i64 {number.place}"
+        where = page.put(f"getelementptr {STORED[kind]}, ptr addrspace(1) {address}, {at}")
         value = page.put(f"load {STORED[kind]}, ptr addrspace(1) {where}, align {BYTES[kind]}")
         return page.put(f"icmp ne i8 {value}, 0") if kind == "b" else value
 
@@ -134,6 +135,7 @@ class GpuProgram:
         warps: of a team, which share the work for 32 elements.
         teams: of a block.
         shared_bytes: of a block's memory.
+        parts: of an element, each of which has a thread.
     """
 
     ptx: str
@@ -141,16 +143,17 @@ class GpuProgram:
     warps: int = 1
     teams: int = 1
     shared_bytes: int = 0
+    parts: int = 1
 
 
-def program(text: str, name: str, warps: int = 1, teams: int = 1, shared_bytes: int = 0) -> GpuProgram:
+def program(text: str, name: str, warps: int = 1, teams: int = 1, shared_bytes: int = 0, parts: int = 1) -> GpuProgram:
     """Return LLVM's text of a kernel as a program; for the rest see `GpuProgram`."""
     symbol = re.sub(r"\W+", "_", name.lower(), flags=re.ASCII).strip("_")
     if not symbol[:1].isalpha():
         symbol = f"{ENTRY}_{symbol}"
     module = llvm.parse_assembly(text.replace(f"@{ENTRY}(", f"@{symbol}("))
     module.verify()
-    return GpuProgram(str(_target().emit_assembly(module)), symbol, warps, teams, shared_bytes)
+    return GpuProgram(str(_target().emit_assembly(module)), symbol, warps, teams, shared_bytes, parts)
 
 
 @cache

@@ -237,10 +237,12 @@ class Instructions:
 
     def _operate(self, operation: ScalarOperation, registers: dict[int, Any]) -> str:
         """Write one operation."""
-        dtype, name = operation.operands[-1].dtype, operation.name
-        kind = dtype.kind
-        type_ = self.vector(TYPES[kind])
         operands = [self.operand(o, registers) for o in operation.operands]
+        return self.operate(operation.name, operation.operands[-1].dtype.kind, operation.dtype.kind, operands)
+
+    def operate(self, name: str, kind: str, made: str, operands: Sequence[str]) -> str:
+        """Write an operation of this name; `kind` is that of the last operand's dtype, `made` of the result's."""
+        type_ = self.vector(TYPES[kind])
         if name == "seldom":
             return operands[0]
         if name in FUSED:
@@ -266,12 +268,12 @@ class Instructions:
             return self.put(f"{minus} {operands[0]}")
         if name == "abs":
             return self.call(self.mangled("abs", "i32"), type_, [(type_, operands[0]), ("i1", "false")])
-        to = self.vector(TYPES[operation.dtype.kind])
+        to = self.vector(TYPES[made])
         if name == "bits":
             return self.put(f"bitcast {type_} {operands[0]} to {to}")
         if kind == "f":
             return self._truncated(operands[0])
-        return self.put(f"{CASTS[kind + operation.dtype.kind]} {type_} {operands[0]} to {to}")
+        return self.put(f"{CASTS[kind + made]} {type_} {operands[0]} to {to}")
 
     def divided(self, dividend: str, divisor: str) -> str:
         """Write an exactly rounded quotient of floats; return its register."""

@@ -26,9 +26,14 @@ COMMUTATIVE: Final = frozenset({"add", "and", "eq", "max", "min", "mul", "ne", "
 class Algebra:
     """Makes expressions, and remembers those it has made."""
 
-    def __init__(self) -> None:
-        """Start empty."""
+    def __init__(self, mirrors: bool = False) -> None:
+        """Start empty.
+
+        Args:
+            mirrors: whether signs are moved outwards, so that what differs by signs alone becomes alike.
+        """
         self._made: dict[tuple[Any, ...], ScalarOperation] = {}
+        self._mirrors = mirrors
 
     def apply(self, name: str, *operands: Number) -> Number:
         """Return an operation on numbers of one dtype (except the condition of "select").
@@ -40,6 +45,8 @@ class Algebra:
                 return np.asarray(KNOWN[name](*operands))[()]
         rule = RULES.get(name)
         simpler = None if rule is None else rule(self, *operands)
+        if simpler is None and self._mirrors and operands[-1].dtype.kind == "f" and name in SIGNED:
+            simpler = SIGNED[name](self, *operands)
         if simpler is not None:
             return simpler
         return self._shared(name, operands, np.dtype(bool) if name in COMPARISONS else operands[-1].dtype)
@@ -83,10 +90,19 @@ class Algebra:
             return number
         return number.view(dtype) if is_known(number) else self._shared("bits", (number,), dtype)
 
+    def turned(self, a: Number, b: Number) -> Number | None:
+        """Return a difference, if the one that is its negation has been made."""
+        made = self._made.get(self._key("sub", (b, a), b.dtype))
+        return None if made is None else self.apply("neg", made)
+
+    def _key(self, name: str, operands: tuple[Number, ...], dtype: np.dtype[Any]) -> tuple[Any, ...]:
+        """Return what an operation is known by."""
+        keys = [(o.dtype.str, o.tobytes()) if is_known(o) else ("", id(o)) for o in operands]
+        return (name, dtype, *(sorted(keys, key=repr) if name in COMMUTATIVE else keys))
+
     def _shared(self, name: str, operands: tuple[Number, ...], dtype: np.dtype[Any]) -> ScalarOperation:
         """Return the one object for an operation on these operands."""
-        keys = [(o.dtype.str, o.tobytes()) if is_known(o) else ("", id(o)) for o in operands]
-        key = (name, dtype, *(sorted(keys, key=repr) if name in COMMUTATIVE else keys))
+        key = self._key(name, operands, dtype)
         if key not in self._made:  # the key has operands' ids; the object keeps them alive
             self._made[key] = ScalarOperation(dtype, name, operands)
         return self._made[key]
@@ -202,6 +218,53 @@ def _same_number(a: Number, b: Number) -> bool:
     return a is b or (is_known(a) and is_known(b) and a.tobytes() == b.tobytes())
 
 
+def _unsigned(number: Number) -> tuple[Number, bool]:
+    """Return a float without its sign, as far as that is known, and whether it had one."""
+    if is_known(number):
+        return (-number, True) if number < 0 else (number, False)
+    negative = isinstance(number, ScalarOperation) and number.name == "neg"
+    return (number.operands[0], True) if negative else (number, False)
+
+
+def _signed_product(name: str) -> Rule:
+    """Return the rule that moves the signs of factors, or of a quotient's numbers, outwards."""
+
+    def rule(algebra: Algebra, a: Number, b: Number) -> Number | None:
+        (a, one), (b, other) = _unsigned(a), _unsigned(b)
+        if not one and not other:
+            return None
+        made = algebra.apply(name, a, b)
+        return made if one == other else algebra.apply("neg", made)
+
+    return rule
+
+
+def _signed_sum(algebra: Algebra, a: Number, b: Number) -> Number | None:
+    (positive, one), (other_positive, other) = _unsigned(a), _unsigned(b)
+    if other and (not one or is_known(a)):
+        return algebra.apply("sub", a, other_positive)
+    if one and not is_known(a):
+        made = algebra.apply("add" if other else "sub", positive, other_positive if other else b)
+        return algebra.apply("neg", made)
+    return algebra.apply("sub", b, positive) if one else None
+
+
+def _signed_difference(algebra: Algebra, a: Number, b: Number) -> Number | None:
+    (positive, one), (other_positive, other) = _unsigned(a), _unsigned(b)
+    if other:
+        return algebra.apply("add", a, other_positive)
+    if one and not is_known(a):
+        return algebra.apply("neg", algebra.apply("add", positive, b))
+    return algebra.turned(a, b)
+
+
+SIGNED: Final[dict[str, Rule]] = {
+    "add": _signed_sum,
+    "div": _signed_product("div"),
+    "mul": _signed_product("mul"),
+    "sub": _signed_difference,
+}
+"""How signs move outwards. Operands keep their order, by which products are fused with sums."""
 RULES: Final[dict[str, Rule]] = {
     "add": _add,
     "and": _and,

@@ -76,9 +76,9 @@ def check(dtype: Any) -> np.dtype[Any]:
 class Scalars:
     """Interprets jaxprs."""
 
-    def __init__(self) -> None:
-        """Start without expressions."""
-        self.algebra = Algebra()
+    def __init__(self, mirrors: bool = False) -> None:
+        """Start without expressions; for `mirrors` see `Algebra`."""
+        self.algebra = Algebra(mirrors)
 
     def run(self, closed: Any, operands: Sequence[Numbers]) -> list[Numbers]:
         """Return the results of a closed jaxpr."""

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
+from functools import partial, reduce
 
 import numpy as np
 from jax.extend.core import ClosedJaxpr
@@ -40,14 +41,14 @@ from evoclaims.kernels.trace.expressions import (
 from evoclaims.kernels.trace.interpreter import Numbers, Scalars, check, listed
 
 
-def with_shortcut(results: Sequence[Number]) -> list[Number]:
+def with_shortcut(results: Sequence[Number], mirrors: bool = False) -> list[Number]:
     """Return a round's results, chosen between both ways.
 
     They are unchanged if there is no `seldom` condition, or if a loop inside depends on one.
     """
     order = in_order(results)
     guards = [e for e in order if isinstance(e, ScalarOperation) and e.name == "seldom"]
-    algebra = Algebra()
+    algebra = Algebra(mirrors)
     new: dict[int, Number] = {id(guard): np.bool_(False) for guard in guards}
     for expression in order:
         if id(expression) not in new and any(id(p) in new for p in operands_of(expression)):
@@ -57,9 +58,11 @@ def with_shortcut(results: Sequence[Number]) -> list[Number]:
             new[id(expression)] = algebra.again(expression, operands)
     if not guards:
         return list(results)
-    condition = guards[0].operands[0]
-    for guard in guards[1:]:
-        condition = algebra.apply("or", condition, guard.operands[0])
+    # Where all guards are False, each is also without what earlier ones switch on. Where some are not, the first is.
+    conditions = [new.get(id(guard.operands[0]), guard.operands[0]) for guard in guards]
+    condition: Number = reduce(partial(algebra.apply, "or"), conditions)
+    if is_known(condition):
+        return list(results)
     short = tuple(new.get(id(result), result) for result in results)
     taken = _shared(condition, results, short, set(map(id, order)))
     choice = Choice(condition, tuple(results), short, taken)
@@ -77,17 +80,18 @@ def _shared(
     return tuple(shared.values())
 
 
-def fused(results: Sequence[Number]) -> list[Number]:
+def fused(results: Sequence[Number], mirrors: bool = False) -> list[Number]:
     """Return numbers with the products of floats that are used once, in a sum or difference, fused with it."""
-    return _Fusing(_products(results)).of(results)
+    return _Fusing(_products(results), mirrors).of(results)
 
 
 class _Fusing:
     """Writes expressions anew, with fused products."""
 
-    def __init__(self, products: frozenset[int]) -> None:
+    def __init__(self, products: frozenset[int], mirrors: bool) -> None:
         """Begin; `products` are the ids of those that are fused."""
         self._products = products
+        self._mirrors = mirrors
         self._new: dict[int, Number] = {}
         self._loops: dict[int, Loop] = {}
 
@@ -115,7 +119,7 @@ class _Fusing:
     def _repeated(self, around: Loop) -> Loop:
         """Return a loop."""
         if id(around) not in self._loops:
-            start, results = self.of(around.start), with_shortcut(self.of(around.results))
+            start, results = self.of(around.start), with_shortcut(self.of(around.results), self._mirrors)
             self._loops[id(around)] = loop(around.rounds, around.carried, start, results)
         return self._loops[id(around)]
 
@@ -141,11 +145,12 @@ def _products(results: Sequence[Number]) -> frozenset[int]:
     return frozenset(chosen)
 
 
-def scalarize(traced: ClosedJaxpr) -> list[Numbers]:
+def scalarize(traced: ClosedJaxpr, mirrors: bool = False) -> list[Numbers]:
     """Return the expressions of every result of a traced function.
 
     Args:
         traced: of small arrays; its i-th argument is array i of `Input`.
+        mirrors: see `Algebra`. Numbers may be rounded otherwise then, since other products are used once.
 
     Raises:
         Unsupported: for a primitive, a use of one, or a dtype without a scalar expression here.
@@ -156,10 +161,6 @@ def scalarize(traced: ClosedJaxpr) -> list[Numbers]:
         listed([Input(check(aval.dtype), array, place) for place in range(math.prod(aval.shape))], aval.shape)
         for array, aval in enumerate(traced.in_avals)
     ]
-    return _fused(Scalars().run(traced, inputs))
-
-
-def _fused(results: list[Numbers]) -> list[Numbers]:
-    """Return results with fused products."""
-    numbers = iter(fused([number for result in results for number in result.flat]))
+    results = Scalars(mirrors).run(traced, inputs)
+    numbers = iter(fused([number for result in results for number in result.flat], mirrors))
     return [listed([next(numbers) for _ in result.flat], result.shape) for result in results]
