@@ -68,7 +68,7 @@ class Kernel:
         """The expressions of the numbers of each result."""
         return scalarize(self._traced)
 
-    @property
+    @cached_property
     def _packed(self) -> tuple[Parts, list[Numbers]] | None:
         """The operations that are alike in all parts, and the results, if there are enough of them."""
         if not self._parts:
