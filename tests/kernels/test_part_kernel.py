@@ -100,6 +100,19 @@ def test_a_limb_s_number_may_go_to_another_limb() -> None:
     _check(function)
 
 
+def test_operations_of_other_types_are_no_pack() -> None:
+    def of_all(numbers: Any) -> Any:
+        return (numbers[0] + numbers[1]) * (numbers[2] + numbers[3])
+
+    def function(limbs: Any, torso: Any) -> Any:
+        count = of_all((limbs[:, 0] > 0).astype(jnp.int32))
+        total = of_all(jnp.abs(limbs[:, 0]) * 2.0 + 1.0)  # made in as many operations
+        given = count + 1, count + 2, total > 30, total > 40  # each is cast for a limb
+        return jnp.stack([limbs[limb] * one.astype(jnp.float32) for limb, one in enumerate(given)])
+
+    _check(function)
+
+
 def test_loops_in_a_loop_are_left_to_one_thread() -> None:
     def function(limbs: Any, torso: Any) -> Any:
         def inner(carry: Any, _: Any) -> Any:
@@ -121,7 +134,7 @@ def _functions(draw: st.DrawFn) -> Function:
     steps: Sequence[tuple[str, int, int]] = draw(
         st.lists(
             st.tuples(
-                st.sampled_from(("mirror", "pull", "push", "gather", "turn", "pick", "seldom", "bend")),
+                st.sampled_from(("mirror", "pull", "push", "gather", "turn", "pick", "seldom", "bend", "count")),
                 st.integers(0, JOINTS - 1),
                 st.integers(0, LIMBS - 1),
             ),
@@ -146,6 +159,8 @@ def _functions(draw: st.DrawFn) -> Function:
                     limbs = jnp.where(limbs > torso[joint], limbs[:, ::-1], -limbs)
                 case "pick":
                     torso = torso.at[joint].add(limbs[limb, joint] * torso[2])
+                case "count":
+                    torso = torso - jnp.sum(limbs[:, joint] > torso[joint]).astype(jnp.float32)
                 case "seldom":
                     limbs = jnp.where(seldom(limbs[:, :1] > 2), limbs + torso[0], limbs)
                 case _:

@@ -79,6 +79,26 @@ def _where_two_ways_differ(x: Any) -> Any:
     return jax.lax.scan(following, jnp.float32(0), None, length=2)[0]
 
 
+def _guards_in_turn(x: Any) -> Any:
+    """Ask a second condition of what the first switches on."""
+
+    def round_(y: Any, _: Any) -> Any:
+        sorted_ = jnp.sort(y)
+        y = jnp.where(seldom(y[0] > 2), sorted_, y) + 0.25
+        y = jnp.where(seldom(y[-1] < y[1]), y[::-1], y)
+        return jnp.where(y > 3, y - 4, y), None
+
+    return jax.lax.scan(round_, x, None, length=4)[0]
+
+
+def test_a_condition_does_not_need_what_an_earlier_one_switches_on() -> None:
+    x = jax.random.uniform(jax.random.key(0), (200, 4), minval=-3.0, maxval=3.0)
+    kernel = _kernel(_guards_in_turn, x)
+    asked = [e.name for e in in_order([_loop(kernel).choice.condition]) if isinstance(e, ScalarOperation)]
+    assert sorted(asked) == ["add", "add", "gt", "lt", "or"]  # nothing is sorted for it
+    np.testing.assert_array_equal(kernel.on_host(x)[0], jax.jit(jax.vmap(_guards_in_turn))(x))
+
+
 def test_the_short_way_is_taken_where_the_condition_is_false_in_all_lanes() -> None:
     width = lanes()
     x = np.zeros((3 * width, 2), np.float32)

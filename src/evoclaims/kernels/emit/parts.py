@@ -279,7 +279,8 @@ class Parts:
         parts = {self.part_of.get(id(term(o)[0])) for o in operands_of(e)} - {None}
         part = next(iter(parts)) if len(parts) == 1 else None if parts else self._wanted.get(id(e))
         name, operands = self.arranged(e)
-        return (name, e.dtype.kind, part is None, *(self._key(number) for number, _ in operands)), part
+        kinds = e.dtype.kind + e.operands[-1].dtype.kind
+        return (name, kinds, part is None, *(self._key(number) for number, _ in operands)), part
 
     def _number(self, key: Any) -> int:
         """Return a key's number: the same in every process, unlike ids."""
