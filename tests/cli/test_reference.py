@@ -47,7 +47,7 @@ def test_reference_takes_the_trials_of_a_look_and_never_fewer_than_are_committed
     status, out, _ = evoclaims("reference", "--unknown-revision")
     path = references.path_of(Path.cwd() / "reference", "smoke", "right", "parity")
     assert status == 0
-    assert f"wrote {path}: 5 trials" in out
+    assert f"wrote {path}: 5 trials\n  left alone of those stored: 1, made with other versions" in out
     assert "left alone: wrong on parity: 4 of 5 trials are stored or committed" in out
     evoclaims("run", "right")
     assert f"wrote {path}: 10 trials" in evoclaims("reference", "--unknown-revision")[1]

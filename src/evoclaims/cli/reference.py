@@ -90,6 +90,13 @@ def main(options: argparse.Namespace) -> int:
             )
             + (f", made with other versions than are installed: {upgraded}" if upgraded else "")
         )
+        written_seeds = {trial.seed for trial in results[:size]}
+        left = {record.seed for record in stored if is_final(record)} - written_seeds
+        if left:
+            print(
+                f"  left alone of those stored: {len(left)}, made with other versions than these, or more than a claim "
+                "looks at"
+            )
         for name in condition.edited_since(results[:size]):
             print(f"  {printable(summary(name))}")
     if unknown:
