@@ -23,7 +23,7 @@ from evoclaims.kernels.emit.gpu_kernel import BLOCK, ENTRY, GpuProgram
 NOT_A_NUMBER = 0x7FC00000
 CALLED = ctypes.CFUNCTYPE(None)
 ASKED = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_int32)
-TOLD = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_int32, ctypes.c_int32)
+SHUFFLED = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_int32, ctypes.c_int32)
 
 
 def run(
@@ -71,34 +71,34 @@ def run_parts(text: str, parts: int, rows: int, arrays: Sequence[Any], results: 
         text,
     )
     for mode in ("idx", "bfly"):
-        told = rf"call i32 @llvm.nvvm.shfl.sync.{mode}.i32\(i32 -1, (i32 %\w+), (i32 \d+), i32 \d+\)"
-        text = re.sub(told, rf"call i32 %{mode}(\1, \2)", text)
-        told = rf"(%\w+) = call float @llvm.nvvm.shfl.sync.{mode}.f32\(i32 -1, float (%\w+), (i32 \d+), i32 \d+\)"
+        call = rf"call i32 @llvm.nvvm.shfl.sync.{mode}.i32\(i32 -1, (i32 %\w+), (i32 \d+), i32 \d+\)"
+        text = re.sub(call, rf"call i32 %{mode}(\1, \2)", text)
+        call = rf"(%\w+) = call float @llvm.nvvm.shfl.sync.{mode}.f32\(i32 -1, float (%\w+), (i32 \d+), i32 \d+\)"
         called = rf"\1.in = bitcast float \2 to i32\n\1.out = call i32 %{mode}(i32 \1.in, \3)"
-        text = re.sub(told, rf"{called}\n\1 = bitcast i32 \1.out to float", text)
+        text = re.sub(call, rf"{called}\n\1 = bitcast i32 \1.out to float", text)
     text = _for_this_processor(text).replace("ptr %anyone)", "ptr %anyone, ptr %idx, ptr %bfly)")
     code = machine_code.address(text, ENTRY)
     read = [np.ascontiguousarray(a) for a in arrays]
     made = [np.full(r.shape, 77, r.dtype) for r in results]
     addresses = [ctypes.c_void_p(a.ctypes.data) for a in (*read, *made)]
-    types = [*[ctypes.c_void_p] * (len(addresses) + 1), *[ctypes.c_int32] * 4, CALLED, ASKED, TOLD, TOLD]
+    types = [*[ctypes.c_void_p] * (len(addresses) + 1), *[ctypes.c_int32] * 4, CALLED, ASKED, SHUFFLED, SHUFFLED]
     kernel = ctypes.CFUNCTYPE(None, *types)(code)
     for element in range(-(-rows * parts // BLOCK) * BLOCK // parts):  # those of the last block compute the last one
         barrier, numbers, votes = threading.Barrier(parts), [0] * parts, dict[int, int]()
 
-        def tell(own: int, number: int, of: int, barrier: Any = barrier, numbers: Any = numbers) -> int:
+        def shuffle(own: int, number: int, of: int, barrier: Any = barrier, numbers: Any = numbers) -> int:
             numbers[own] = number
             barrier.wait(60)
-            told: int = numbers[of]
+            shuffled: int = numbers[of]
             barrier.wait(60)
-            return told
+            return shuffled
 
         anyone, nothing = ASKED(partial(_anyone, barrier, votes)), CALLED(lambda: None)
         threads = []
         for part in range(parts):
             asked = (
-                TOLD(partial(tell, part)),
-                TOLD(lambda number, bit, part=part, tell=tell: tell(part, number, part ^ bit)),
+                SHUFFLED(partial(shuffle, part)),
+                SHUFFLED(lambda number, bit, part=part, shuffle=shuffle: shuffle(part, number, part ^ bit)),
             )
             block, lane = divmod(element * parts + part, BLOCK)
             given = (*addresses, 0, block, lane, 0, 0, nothing, anyone, *asked)

@@ -32,7 +32,7 @@ SIDES = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]], np.float3
 Function = Callable[[Any, Any], Any]
 
 
-def _parts(function: Function, rows: int) -> tuple[Parts, list[Any], Kernel]:
+def _parts(function: Function) -> tuple[Parts, list[Any], Kernel]:
     """Return what is packed of a function of limbs [LIMBS, JOINTS] and a torso [TORSO], its results and its kernel."""
     shapes = jax.ShapeDtypeStruct((LIMBS, JOINTS), np.float32), jax.ShapeDtypeStruct((TORSO,), np.float32)
     kernel = Kernel(function, "This", jax.tree.structure(shapes), shapes)
@@ -44,7 +44,7 @@ def _parts(function: Function, rows: int) -> tuple[Parts, list[Any], Kernel]:
 
 def _check(function: Function, rows: int = 3, seed: int = 0) -> Parts:
     """Check that parts compute together what this processor's kernel does; return what is packed."""
-    parts, results, kernel = _parts(function, rows)
+    parts, results, kernel = _parts(function)
     draw = np.random.default_rng(seed)
     leaves = [draw.integers(-3, 4, (rows, *shape.shape)).astype(np.float32) for shape in kernel.shapes]
     text = part_kernel.text(parts, results, kernel.read, dict.fromkeys(kernel.read, 1), rows)
@@ -123,9 +123,16 @@ def test_loops_in_a_loop_are_left_to_one_thread() -> None:
 
         return jax.lax.scan(outer, limbs + torso[0], None, length=2)[0]
 
-    parts, _, _ = _parts(function, 1)
+    parts, _, _ = _parts(function)
     assert not parts.work
     assert parts.share() == 1
+
+
+def test_parts_that_do_not_divide_a_warp_are_refused() -> None:
+    parts, results, kernel = _parts(lambda limbs, torso: limbs * torso[0])
+    parts.count = 3
+    with pytest.raises(ValueError, match="3 parts, which do not divide a warp of 32"):
+        part_kernel.text(parts, results, kernel.read, {}, 1)
 
 
 @st.composite

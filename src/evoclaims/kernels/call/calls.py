@@ -58,7 +58,7 @@ def on_gpu(program: GpuProgram, operands: Sequence[Array], shapes: Shapes, eleme
         program: the kernel.
         operands: the arrays it reads.
         shapes: of its results.
-        elements: of the batch, one for each lane of a team.
+        elements: of the batch; one for each lane of a team, or a lane for each of its parts.
     """
     one = np.int32(1)
     return jax.ffi.ffi_call(GPU_TARGET, shapes)(

@@ -148,19 +148,21 @@ class Kernel:
     def _gpu_program(self, rows: int, shared: tuple[int, ...]) -> gpu_kernel.GpuProgram:
         """Return the kernel for NVIDIA's GPUs: for how many elements, how many of which share a row of each array."""
         if (rows, shared) not in self._gpu_programs:  # a legged robot's takes seconds
-            results, given = [self.results[i] for i in self.written], dict(zip(self.read, shared, strict=True))
-            packed = self._packed
-            shape = None if packed else block_kernel.chosen(results, rows)
-            if packed:
-                text = part_kernel.text(*packed, self.read, given, rows)
-                made = gpu_kernel.program(text, self.name, parts=packed[0].count)
-            elif shape is None:
-                made = gpu_kernel.program(gpu_kernel.text(results, self.read, given, rows), self.name)
-            else:
-                text = block_kernel.text(shape, results, self.read, given, rows)
-                made = gpu_kernel.program(text, self.name, shape.warps, shape.teams, shape.shared_bytes)
-            self._gpu_programs[rows, shared] = made
+            self._gpu_programs[rows, shared] = self._written_for_gpus(rows, dict(zip(self.read, shared, strict=True)))
         return self._gpu_programs[rows, shared]
+
+    def _written_for_gpus(self, rows: int, shared: dict[int, int]) -> gpu_kernel.GpuProgram:
+        """Write it in the way that is fastest; see `_gpu_program`."""
+        if self._packed:
+            parts, alike = self._packed
+            text = part_kernel.text(parts, alike, self.read, shared, rows)
+            return gpu_kernel.program(text, self.name, parts=parts.count)
+        results = [self.results[i] for i in self.written]
+        shape = block_kernel.chosen(results, rows)
+        if shape is None:
+            return gpu_kernel.program(gpu_kernel.text(results, self.read, shared, rows), self.name)
+        text = block_kernel.text(shape, results, self.read, shared, rows)
+        return gpu_kernel.program(text, self.name, shape.warps, shape.teams, shape.shared_bytes)
 
     def _call(self, leaves: Sequence[Array], call: Callable[..., Any]) -> list[Array]:
         """Return the results of a kernel for every element of a batch.

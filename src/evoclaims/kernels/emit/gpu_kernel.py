@@ -64,7 +64,7 @@ class Element:
         self._addresses.clear()
 
     def load(self, number: Input, place: str = "") -> str:
-        """Return the register with a number that is read: this one, or of the same array that at `place`, an i32."""
+        """Return the register with a number that is read; `place`, an i32, replaces its place in the array."""
         kind, page, shared = number.dtype.kind, self._page, self._shared[number.array]
         address = self._address(f"%a{number.array}", self._arrays[number.array].size, kind, shared)
         at = f"i32 {place}" if place else f"i64 {number.place}"

@@ -43,6 +43,8 @@ def text(
         shared: how many consecutive elements share a row of each.
         rows: elements of the batch.
     """
+    if BLOCK % parts.count:
+        raise ValueError(f"An element has {parts.count} parts, which do not divide a warp of {BLOCK} threads.")
     page = GpuInstructions()
     page.label("entry")
     block, lane = (page.call(f"llvm.nvvm.read.ptx.sreg.{name}.x", "i32", []) for name in ("ctaid", "tid"))
@@ -122,7 +124,7 @@ class _Writer:
         own = self._added("", total.alike)
         distance = 1
         while distance < self._parts.count:
-            own = page.put(f"fadd float {own}, {self._told(own, 'f', distance, 'bfly')}")
+            own = page.put(f"fadd float {own}, {self._shuffled(own, 'f', distance, 'bfly')}")
             distance *= 2
         return self._added(own, [[product] for product in total.others])
 
@@ -184,24 +186,24 @@ class _Writer:
         part = self._parts.part_of.get(id(number))
         if part is None:
             return self._registers["shared", id(number)]
-        key = ("told", id(number))
+        key = ("everywhere", id(number))
         if key not in self._registers:
-            self._registers[key] = self._told(self._registers[self._unit(number)], number.dtype.kind, part)
+            self._registers[key] = self._shuffled(self._registers[self._unit(number)], number.dtype.kind, part)
         return self._registers[key]
 
-    def _told(self, value: str, kind: str, part: int, mode: str = "idx") -> str:
+    def _shuffled(self, value: str, kind: str, part: int, mode: str = "idx") -> str:
         """Return what a part's thread has; or, by `bfly`, one whose number differs by a bit."""
         page, suffix = self._page, "f32" if kind == "f" else "i32"
         type_ = "float" if kind == "f" else "i32"
         if kind == "b":
             value = page.put(f"zext i1 {value} to i32")
         within = ((BLOCK - self._parts.count) << 8) | (BLOCK - 1)
-        told = page.call(
+        shuffled = page.call(
             f"llvm.nvvm.shfl.sync.{mode}.{suffix}",
             type_,
             [EVERYONE, (type_, value), ("i32", str(part)), ("i32", str(within))],
         )
-        return page.put(f"icmp ne i32 {told}, 0") if kind == "b" else told
+        return page.put(f"icmp ne i32 {shuffled}, 0") if kind == "b" else shuffled
 
     def _constant(self, values: Sequence[bytes], type_: str) -> str:
         """Return the register with a part's constant."""
