@@ -101,14 +101,18 @@ class Lanes:
         distinct = list(dict.fromkeys(homes))
         began = working_time()
         with self._settings():
-            lowered = [self._lowered(self._program.start, home, _seeds(size)) for home in distinct]
+            start = self.layout.over_trials(self._program.start)
+            lowered = [self._lowered(start, home, _seeds(size)) for home in distinct]
             starts = dict(zip(distinct, self._side_by_side(self._finished, lowered), strict=True))
         give_back()
         self.seconds += working_time() - began
         return tuple(starts[home](*share) for home, share in zip(homes, self.place((known, idle), width), strict=True))
 
     def advance(self, state: Shares, until: int, width: int) -> tuple[Shares, Report]:
-        """Advance every trial to its end or to `until` steps; `state` is donated. The report is on the host."""
+        """Advance trials to their ends or to `until` steps; `state` is donated. The report is on the host.
+
+        Side by side, those on a device stop when one of them ends; they go on when it has been made idle.
+        """
 
         def one(program: Compiled, share: TrialState, bound: Any) -> tuple[TrialState, Report]:
             share, report = program.advance(share, bound)
@@ -125,6 +129,11 @@ class Lanes:
         )
         score: Score = self.gather(scores)
         return score
+
+    def with_idle(self, state: Shares, idle: Sequence[bool]) -> Shares:
+        """Make lanes idle."""
+        marks = self.place(np.array(idle), len(idle))
+        return tuple(dataclasses.replace(share, idle=mark) for share, mark in zip(state, marks, strict=True))
 
     def arrangement(self, active: Sequence[int], width: int) -> list[int | None]:
         """Deal active lanes to the shares in turn, so that all shares have about equal work."""
@@ -156,10 +165,10 @@ class Lanes:
             yield
 
     def _lowered(self, function: Callable[..., Any], home: jax.Device, arguments: Any, donate: bool = False) -> Any:
-        """Trace a single-trial function for the lanes of a share on a device; `arguments` are shapes and dtypes."""
+        """Trace a function of the lanes of a share on a device; `arguments` are shapes and dtypes."""
         place = SingleDeviceSharding(home)
         placed = jax.tree.map(lambda leaf: jax.ShapeDtypeStruct(leaf.shape, leaf.dtype, sharding=place), arguments)
-        return jax.jit(self.layout.over_trials(function), donate_argnums=(0,) if donate else ()).lower(*placed)
+        return jax.jit(function, donate_argnums=(0,) if donate else ()).lower(*placed)
 
     def _finished(self, lowered: Any) -> Any:
         return lowered.compile(self.layout.options(self.condition))
@@ -167,13 +176,14 @@ class Lanes:
     def _compile(self, size: int, homes: Sequence[jax.Device]) -> dict[jax.Device, Compiled]:
         """Compile the repeated programs ahead of time, to measure compile time and run time separately."""
         state, until = self.shapes(size), _seeds(size)[0]
+        advance, examine = self.layout.advance(self._program), self.layout.over_trials(self._program.examine)
         with self._settings():
             lowered = [
                 program
                 for home in homes
                 for program in (
-                    self._lowered(self._program.advance, home, (state, until), donate=True),
-                    self._lowered(self._program.examine, home, (state,)),
+                    self._lowered(advance, home, (state, until), donate=True),
+                    self._lowered(examine, home, (state,)),
                 )
             ]
             give_back()  # what compiling the kernels has freed

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from enum import Enum
-from functools import partial
+from functools import wraps
 from typing import Any, Final
 
 import jax
 import jax.numpy as jnp
 
 from evoclaims.trials.devices import usable_cores
+from evoclaims.trials.program import Program
 from evoclaims.trials.spec import Condition
 
 SHORT: Final = 100_000
@@ -37,7 +38,11 @@ class Layout(Enum):
 
     def over_trials(self, function: Callable[..., Any]) -> Callable[..., Any]:
         """Batch a single-trial function over a leading axis of all its arguments, of length one if trials are alone."""
-        return partial(_alone, function) if self.alone else jax.vmap(function)
+        return _alone(function) if self.alone else jax.vmap(function)
+
+    def advance(self, program: Program) -> Callable[..., Any]:
+        """Return what advances trials, leaves [trials]."""
+        return self.over_trials(program.advance) if self.alone else program.advance_together
 
     def options(self, condition: Condition) -> dict[str, Any] | None:
         """Return the compiler options; they depend only on condition and layout, so that bits do, too."""
@@ -75,7 +80,10 @@ def layout_on(platform: str) -> Layout:
     return Layout.ALONE if platform == "cpu" else Layout.VECTOR
 
 
-def _alone(function: Callable[..., Any], *arguments: Any) -> Any:
-    """Remove the arguments' leading axis of length one, call the function, and add the axis to its results."""
-    trial = jax.tree.map(lambda leaf: jnp.squeeze(leaf, 0), arguments)
-    return jax.tree.map(lambda leaf: leaf[None], function(*trial))
+def _alone(function: Callable[..., Any]) -> Callable[..., Any]:
+    @wraps(function)
+    def of_one(*arguments: Any) -> Any:
+        trial = jax.tree.map(lambda leaf: jnp.squeeze(leaf, 0), arguments)
+        return jax.tree.map(lambda leaf: leaf[None], function(*trial))
+
+    return of_one

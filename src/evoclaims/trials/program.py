@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import jax
@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from evoclaims.core.keys import EVALUATION, TRAINING, streams, trial_key
-from evoclaims.core.pytree import pytree, strong
+from evoclaims.core.pytree import pytree, select, strong
 from evoclaims.envs.base import Episode, Numbered, PolicyFn, Task
 from evoclaims.kernels import kernel_prng
 from evoclaims.methods.base import Progress
@@ -80,7 +80,7 @@ class TrialState:
         steps: steps of the method taken.
         last: what the last step reported.
         diverged: whether a number is no longer finite.
-        idle: True for a lane that only fills the batch.
+        idle: True for a lane that only fills the batch, or whose trial has ended and been examined.
         numbers: the task's numbers, if it has any (`Numbered`).
     """
 
@@ -150,38 +150,28 @@ class Program:
 
     def advance(self, trial: TrialState, until: Int[Array, ""]) -> tuple[TrialState, Report]:
         """Take steps until the trial has ended or has taken `until` of them."""
-        method, task = self.condition.method, self._task(trial)
-        training_key = streams(kernel_prng(trial_key(trial.seed, TRAINING)), "step")[0]
+        step = partial(self._step, _training_key(trial), self._task(trial))
+        trial = jax.lax.while_loop(lambda trial: self._running(trial, until), step, trial)
+        return trial, self._report(trial)
 
-        def running(trial: TrialState) -> Bool[Array, ""]:
-            return ~self._ended(trial) & (trial.steps < until)
+    def advance_together(self, trials: TrialState, until: Int[Array, " trials"]) -> tuple[TrialState, Report]:
+        """Advance trials side by side until the first ends or all have taken `until` steps; leaves [trials].
 
-        def step(trial: TrialState) -> TrialState:
-            # The key depends on seed and step alone: a trial that continues from a checkpoint draws the same numbers.
-            key = jax.random.fold_in(training_key, trial.steps)
-            state, progress = method.step(key, task, trial.ascent.level, trial.method)
-            steps = trial.steps + 1
-            healthy = progress.healthy & jnp.isfinite(progress.fitness) & jnp.isfinite(progress.success)
-            # A step that diverged never solves a level: its success may come from numbers that are not finite.
-            return replace(
-                trial,
-                method=strong(state),
-                ascent=climb(trial.ascent, jnp.where(healthy, progress.success, 0.0), steps),
-                steps=steps,
-                last=strong(progress),
-                diverged=~healthy,
-            )
+        Whoever calls must then examine a trial that has ended, and make its lane idle. An idle lane keeps all but its
+        method's state: to keep that, too, would move whole populations at every step.
+        """
+        keys = jax.vmap(_training_key)(trials)
 
-        trial = jax.lax.while_loop(running, step, trial)
-        return trial, Report(
-            steps=trial.steps,
-            level=trial.ascent.level,
-            fitness=trial.last.fitness,
-            success=trial.last.success,
-            metrics=trial.last.metrics,
-            ended=self._ended(trial),
-            diverged=trial.diverged,
-        )
+        def all_run(trials: TrialState) -> Bool[Array, ""]:
+            return ~jnp.all(trials.idle) & jnp.all(trials.idle | jax.vmap(self._running)(trials, until))
+
+        def step(key: PRNGKeyArray, trial: TrialState) -> TrialState:
+            stepped = self._step(key, self._task(trial), trial)
+            small = select(trial.idle, replace(trial, method=()), replace(stepped, method=()))
+            return replace(small, method=stepped.method)
+
+        trials = jax.lax.while_loop(all_run, lambda trials: jax.vmap(step)(keys, trials), trials)
+        return trials, jax.vmap(self._report)(trials)
 
     def examine(self, trial: TrialState) -> Score:
         """Examine the trial's champion on every level, with keys that training never sees."""
@@ -197,10 +187,44 @@ class Program:
         """The shapes of what a step reports; cached, since tracing a step takes seconds."""
         return traced_progress(self.condition.method, self.condition.task)
 
+    def _step(self, training_key: PRNGKeyArray, task: Task, trial: TrialState) -> TrialState:
+        # The key depends on seed and step alone: a trial that continues from a checkpoint draws the same numbers.
+        key = jax.random.fold_in(training_key, trial.steps)
+        state, progress = self.condition.method.step(key, task, trial.ascent.level, trial.method)
+        steps = trial.steps + 1
+        healthy = progress.healthy & jnp.isfinite(progress.fitness) & jnp.isfinite(progress.success)
+        # A step that diverged never solves a level: its success may come from numbers that are not finite.
+        return replace(
+            trial,
+            method=strong(state),
+            ascent=climb(trial.ascent, jnp.where(healthy, progress.success, 0.0), steps),
+            steps=steps,
+            last=strong(progress),
+            diverged=~healthy,
+        )
+
+    def _report(self, trial: TrialState) -> Report:
+        return Report(
+            steps=trial.steps,
+            level=trial.ascent.level,
+            fitness=trial.last.fitness,
+            success=trial.last.success,
+            metrics=trial.last.metrics,
+            ended=self._ended(trial),
+            diverged=trial.diverged,
+        )
+
     def _task(self, trial: TrialState) -> Task:
         task = self.condition.task
         return task.with_numbers(trial.numbers) if isinstance(task, Numbered) else task
 
+    def _running(self, trial: TrialState, until: Int[Array, ""]) -> Bool[Array, ""]:
+        return ~self._ended(trial) & (trial.steps < until)
+
     def _ended(self, trial: TrialState) -> Bool[Array, ""]:
         done = trial.diverged | trial.idle | (trial.steps >= self.condition.steps)
         return done if self.condition.progression == "whole_budget" else done | trial.ascent.finished
+
+
+def _training_key(trial: TrialState) -> PRNGKeyArray:
+    return streams(kernel_prng(trial_key(trial.seed, TRAINING)), "step")[0]

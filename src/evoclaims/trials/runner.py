@@ -176,15 +176,27 @@ def _finish(run: Run, header: Header, begin: Callable[[], Batch | None]) -> None
 
 
 def _go_on(run: Run, batch: Batch, allowance: Allowance, strides: Strides) -> tuple[Batch, RunProgress | None]:
-    """Call the device once; at the end of a chunk, store the trials that have ended and report progress."""
-    batch, report, whole = _advance(run, batch, allowance, strides)
+    """Let every running trial take about a second's steps; store those that end; at a chunk's end, report progress."""
+    chunk_end = min((batch.header.chunks + 1) * run.condition.budget.chunk(run.condition.cost), run.condition.steps)
+    until = strides.after(batch.steps, chunk_end)
+    ran, level = batch.header.run_seconds, False
+    while not level:  # side by side, trials stop where one ends
+        batch, report = _advance(run, batch, until, allowance)
+        ended = [lane for lane in batch.running if report.ended[lane]]
+        others = [lane for lane in batch.running if not report.ended[lane]]
+        level = all(report.steps[lane] >= until for lane in others)
+        whole = level and (until == chunk_end or not others)
+        batch = _with_points(run, batch, report, batch.running if whole else ended)
+        assert level or ended, "trials that had taken different numbers of steps shared a program"
+        if ended:
+            batch = _store_ended(run, batch, report, ended, allowance)
+    strides.took(until - batch.steps, batch.header.run_seconds - ran)
+    batch = replace(batch, steps=until)
     if not whole:
         return batch, None
-    ended = [lane for lane in batch.running if report.ended[lane]]
-    if ended:
-        batch = _store_ended(run, batch, report, ended, allowance)
+    batch = replace(batch, header=replace(batch.header, chunks=batch.header.chunks + 1))
     progress = _progress(run, batch, report, strides)  # the report has the lanes before narrowing
-    return _rearranged(run, batch) if ended else batch, progress
+    return _rearranged(run, batch), progress
 
 
 def _save(run: Run, batch: Batch, allowance: Allowance) -> None:
@@ -194,35 +206,29 @@ def _save(run: Run, batch: Batch, allowance: Allowance) -> None:
     checkpoint.save(run.store.checkpoints, header, run.lanes.gather(batch.state))
 
 
-def _advance(run: Run, batch: Batch, allowance: Allowance, strides: Strides) -> tuple[Batch, Report, bool]:
-    """Call the device once; at the end of a chunk, add a point to each running trial's curve.
-
-    Returns:
-        The batch, the device's report, and whether a chunk (or every running trial) has ended.
-    """
-    cost = run.condition.cost
-    end = min((batch.header.chunks + 1) * run.condition.budget.chunk(cost), run.condition.steps)
-    until = strides.after(batch.steps, end)
+def _advance(run: Run, batch: Batch, until: int, allowance: Allowance) -> tuple[Batch, Report]:
+    """Call the device once."""
     began, used, compiled = working_time(), time.process_time(), run.lanes.seconds
     state, report = allowance.spend(lambda: run.lanes.advance(batch.state, until, len(batch.header.lanes)))
     compiling = run.lanes.seconds - compiled
     seconds, processor = working_time() - began - compiling, max(time.process_time() - used - compiling, 0.0)
-    strides.took(until - batch.steps, seconds)
     header = replace(
         batch.header,
         run_seconds=batch.header.run_seconds + seconds,
         processor_seconds=batch.header.processor_seconds + processor,
     )
-    whole = until == end or all(report.ended[lane] for lane in batch.running)
-    if whole:
-        curves = dict(header.curves)
-        for lane in batch.running:
-            seed = str(header.lanes[lane])
-            point = curve_point(cost, report, lane)
-            check_success(run.condition.label, point["success"])
-            curves[seed] = {name: [*curves[seed].get(name, []), value] for name, value in point.items()}
-        header = replace(header, chunks=header.chunks + 1, curves=curves)
-    return replace(batch, header=header, state=state, steps=until), report, whole
+    return replace(batch, header=header, state=state), report
+
+
+def _with_points(run: Run, batch: Batch, report: Report, lanes: Sequence[int]) -> Batch:
+    """Add a point to the curves of the trials in these lanes."""
+    curves = dict(batch.header.curves)
+    for lane in lanes:
+        seed = str(batch.header.lanes[lane])
+        point = curve_point(run.condition.cost, report, lane)
+        check_success(run.condition.label, point["success"])
+        curves[seed] = {name: [*curves[seed].get(name, []), value] for name, value in point.items()}
+    return replace(batch, header=replace(batch.header, curves=curves))
 
 
 def _store_ended(run: Run, batch: Batch, report: Report, ended: Sequence[int], allowance: Allowance) -> Batch:
@@ -242,7 +248,8 @@ def _store_ended(run: Run, batch: Batch, report: Report, ended: Sequence[int], a
             run.watch(RunProgress(run.condition.label, text, 1, remark=True))
             _log.warning("%s: %s.", run.condition.label, text)
     running = [None if lane in ended else seed for lane, seed in enumerate(header.lanes)]
-    return replace(batch, header=replace(header, lanes=running))
+    idle = run.lanes.with_idle(batch.state, [seed is None for seed in running])
+    return replace(batch, header=replace(header, lanes=running), state=idle)
 
 
 def _give_up(run: Run, header: Header) -> None:
