@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
@@ -78,6 +78,25 @@ class Method(Protocol[S]):
 
         Of the methods here, those that evaluate a champion again beside their population leave that episode out.
         """
+
+
+@runtime_checkable
+class Resizable(Protocol):
+    """A method whose steps are cheaper in smaller arrays, while its state fits them; the size makes no difference."""
+
+    def sizes(self, task: Task) -> Sequence[Any]:
+        """Return the sizes, smallest first; the last is that of the state elsewhere."""
+
+    def size_for(self, task: Task, state: Any) -> Int[Array, ""]:
+        """Return the place of the smallest size that the next step fits."""
+
+    def in_size(self, size: Any, state: Any) -> Any:
+        """Return the state in arrays of this size, for `step_in_size`, or back in those of the last."""
+
+    def step_in_size(
+        self, size: Any, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: Any
+    ) -> tuple[Any, Progress]:
+        """Do as `step`, in arrays of this size."""
 
 
 @runtime_checkable

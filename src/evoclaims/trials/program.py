@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
@@ -15,11 +15,14 @@ from evoclaims.core.keys import EVALUATION, TRAINING, streams, trial_key
 from evoclaims.core.pytree import pytree, select, strong
 from evoclaims.envs.base import Episode, Numbered, PolicyFn, Task
 from evoclaims.kernels import kernel_prng
-from evoclaims.methods.base import Progress
+from evoclaims.methods.base import Progress, Resizable
 from evoclaims.trials.compatibility import both_named, check_scores, traced_progress
 from evoclaims.trials.spec import Condition
 
 NEVER = -1
+
+Take = Callable[..., tuple[Any, Progress]]
+"""Takes a step of a method: gets a key, the task, the level and the method's state."""
 
 
 @pytree
@@ -150,7 +153,7 @@ class Program:
 
     def advance(self, trial: TrialState, until: Int[Array, ""]) -> tuple[TrialState, Report]:
         """Take steps until the trial has ended or has taken `until` of them."""
-        step = partial(self._step, _training_key(trial), self._task(trial))
+        step = partial(self._step, self.condition.method.step, _training_key(trial), self._task(trial))
         trial = jax.lax.while_loop(lambda trial: self._running(trial, until), step, trial)
         return trial, self._report(trial)
 
@@ -160,17 +163,24 @@ class Program:
         Whoever calls must then examine a trial that has ended, and make its lane idle. An idle lane keeps all but its
         method's state: to keep that, too, would move whole populations at every step.
         """
+        method = self.condition.method
         keys = jax.vmap(_training_key)(trials)
 
         def all_run(trials: TrialState) -> Bool[Array, ""]:
             return ~jnp.all(trials.idle) & jnp.all(trials.idle | jax.vmap(self._running)(trials, until))
 
-        def step(key: PRNGKeyArray, trial: TrialState) -> TrialState:
-            stepped = self._step(key, self._task(trial), trial)
+        def step(take: Take, trials: TrialState) -> TrialState:
+            return jax.vmap(partial(step_or_stay, take))(keys, trials)
+
+        def step_or_stay(take: Take, key: PRNGKeyArray, trial: TrialState) -> TrialState:
+            stepped = self._step(take, key, self._task(trial), trial)
             small = select(trial.idle, replace(trial, method=()), replace(stepped, method=()))
             return replace(small, method=stepped.method)
 
-        trials = jax.lax.while_loop(all_run, lambda trials: jax.vmap(step)(keys, trials), trials)
+        if isinstance(method, Resizable):
+            trials = _in_sizes(method, self.condition.task, step, all_run, trials)
+        else:
+            trials = jax.lax.while_loop(all_run, partial(step, method.step), trials)
         return trials, jax.vmap(self._report)(trials)
 
     def examine(self, trial: TrialState) -> Score:
@@ -187,10 +197,11 @@ class Program:
         """The shapes of what a step reports; cached, since tracing a step takes seconds."""
         return traced_progress(self.condition.method, self.condition.task)
 
-    def _step(self, training_key: PRNGKeyArray, task: Task, trial: TrialState) -> TrialState:
+    def _step(self, take: Take, training_key: PRNGKeyArray, task: Task, trial: TrialState) -> TrialState:
+        """Let the method `take` a step."""
         # The key depends on seed and step alone: a trial that continues from a checkpoint draws the same numbers.
         key = jax.random.fold_in(training_key, trial.steps)
-        state, progress = self.condition.method.step(key, task, trial.ascent.level, trial.method)
+        state, progress = take(key, task, trial.ascent.level, trial.method)
         steps = trial.steps + 1
         healthy = progress.healthy & jnp.isfinite(progress.fitness) & jnp.isfinite(progress.success)
         # A step that diverged never solves a level: its success may come from numbers that are not finite.
@@ -228,3 +239,32 @@ class Program:
 
 def _training_key(trial: TrialState) -> PRNGKeyArray:
     return streams(kernel_prng(trial_key(trial.seed, TRAINING)), "step")[0]
+
+
+def _in_sizes(
+    method: Resizable,
+    task: Task,
+    step: Callable[[Take, TrialState], TrialState],
+    go_on: Callable[[TrialState], Array],
+    trials: TrialState,
+) -> TrialState:
+    """Let trials step while they `go_on`, in the smallest arrays that all of them fit: a loop for each size."""
+    sizes = method.sizes(task)
+
+    def place(trials: TrialState) -> Array:
+        return jnp.max(jax.vmap(partial(method.size_for, task))(trials.method))
+
+    def turned(size: Any, trials: TrialState) -> TrialState:
+        return replace(trials, method=jax.vmap(partial(method.in_size, size))(trials.method))
+
+    def loop(here: int, trials: TrialState) -> TrialState:
+        def fit(trials: TrialState) -> Array:
+            return go_on(trials) & (place(trials) == here)
+
+        take = partial(method.step_in_size, sizes[here])
+        small = jax.lax.while_loop(fit, partial(step, take), turned(sizes[here], trials))
+        return turned(sizes[-1], small)
+
+    loops = [partial(loop, here) for here in range(len(sizes))]
+    made: TrialState = jax.lax.while_loop(go_on, lambda trials: jax.lax.switch(place(trials), loops, trials), trials)
+    return made

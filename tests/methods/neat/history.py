@@ -11,6 +11,7 @@ import numpy as np
 import reference
 from reference import Record
 
+from evoclaims.methods.neat.capacity import capacities
 from evoclaims.methods.neat.population import Population, first_population, next_population
 from evoclaims.methods.neat.settings import Attribute, Mutation, Settings, Species
 from evoclaims.methods.neat.species import SpeciesState
@@ -83,7 +84,8 @@ def evolved() -> History:
         draw, breed = jax.random.split(key)
         drawn = jax.random.randint(draw, (SETTINGS.population,), 0, 8)
         fitness = jnp.where(drawn == 0, jnp.nan, drawn.astype(jnp.float32))
-        following = next_population(breed, SETTINGS, population, fitness, INPUTS, OUTPUTS)
+        sizes = capacities(SETTINGS, INPUTS, OUTPUTS)
+        following = next_population(breed, SETTINGS, sizes, population, fitness, INPUTS, OUTPUTS)
         return following, (population, fitness)
 
     @jax.jit

@@ -63,17 +63,3 @@ def test_arrays_have_room_for_one_more_node_and_two_more_connections(
             capacity.capacities(Settings(), 2, 1), groups, lambda n, c, _: size(n, c), jnp.zeros(())
         )
         assert tuple(np.asarray(chosen).tolist()) == wanted
-
-
-def test_the_choice_of_the_largest_genome_is_taken_for_all_trials_of_a_batch() -> None:
-    counts = jnp.array([[5, 5], [5, 40]], jnp.int32)
-    one = stacked([made([0, 1, 2], {}, capacity=(100, 400))] * 2)
-
-    def size(count: jax.Array) -> jax.Array:
-        genomes = replace(jax.tree.map(jnp.asarray, one), node_count=count)
-        return capacity.in_capacity(
-            capacity.capacities(Settings(), 2, 1), (genomes,), lambda n, c, _: jnp.asarray(n, jnp.int32), count
-        )
-
-    assert np.asarray(jax.jit(jax.vmap(size))(counts)).tolist() == [100, 100]
-    assert int(size(counts[0])) == 32

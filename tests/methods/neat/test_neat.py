@@ -86,10 +86,13 @@ def test_a_trial_alone_is_the_same_trial_to_the_bit(
     assert alone.digest == batch[1].digest
 
 
-def test_trials_side_by_side_have_the_same_structure_and_nearly_the_same_numbers(
+def test_trials_side_by_side_have_the_same_structure_and_nearly_the_same_numbers_in_arrays_of_three_sizes(
     batch: list[TrialResult], tmp_path: Path, device: list[Any], programs: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("evoclaims.trials.lanes.layout_on", lambda platform: Layout.VECTOR)
+    monkeypatch.setattr("evoclaims.methods.neat.capacity.SMALLER", ((4, 5), (5, 7)))
+    grown = [max(result.curves["champion_connections"]) for result in batch]
+    assert max(grown) + 2 > 7  # so that the largest are needed; the first networks fit the smallest
     store = Store(tmp_path)
     for one, other in zip(batch, run(CONDITION, SEEDS, store, device), strict=True):
         assert (one.seed, one.status, one.levels["solved_at"]) == (other.seed, other.status, other.levels["solved_at"])

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, ClassVar, Protocol
 
@@ -17,13 +18,14 @@ from evoclaims.envs.base import Episode, Task
 from evoclaims.kernels import take_rows
 from evoclaims.methods.base import Policy, Progress
 from evoclaims.methods.flat_champion import no_episode
-from evoclaims.methods.neat.capacity import capacities, in_capacity
+from evoclaims.methods.neat.capacity import capacities, fitting, in_capacity
 from evoclaims.methods.neat.population import (
     Parents,
     Population,
     choose_parents,
     first_population,
     forget_records,
+    in_arrays,
     next_population,
 )
 from evoclaims.methods.neat.settings import PAPER, Settings
@@ -87,19 +89,47 @@ class GenomeMethod(ABC):
         self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: Evolution
     ) -> tuple[Evolution, Progress]:
         """Evaluate the population on `level` and replace it by the next."""
+        return self._generation(self.sizes(task), key, task, level, state)
+
+    def sizes(self, task: Task) -> list[tuple[int, int]]:
+        """Return the capacities (nodes, connections) that a generation may work in, the largest last."""
+        network = self.network(task)
+        return capacities(self.settings, network.inputs, network.outputs)
+
+    def size_for(self, task: Task, state: Evolution) -> Int[Array, ""]:
+        """Return the place of the smallest size that the next generation fits."""
+        return fitting(self.sizes(task), (state.population.genomes, state.population.species.centres))
+
+    def in_size(self, size: tuple[int, int], state: Evolution) -> Evolution:
+        """Cut or pad the genomes; a champion that is cut off is replaced by the next step's."""
+        return replace(state, population=in_arrays(state.population, *size), champion=resized(state.champion, *size))
+
+    def step_in_size(
+        self, size: tuple[int, int], key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: Evolution
+    ) -> tuple[Evolution, Progress]:
+        """Do as `step`, in arrays of this size, which the generation must fit."""
+        return self._generation([size], key, task, level, state)
+
+    def _generation(
+        self,
+        sizes: Sequence[tuple[int, int]],
+        key: PRNGKeyArray,
+        task: Task,
+        level: Int[Array, ""],
+        state: Evolution,
+    ) -> tuple[Evolution, Progress]:
         network, settings, population = self.network(task), self.settings, state.population
         if settings.species.on_level_up == "reset":
             population = select(level == state.level, population, forget_records(population))
         episode_key, reproduction_key = streams(key, "episode", "reproduction")
         run = partial(_evaluate, self.encoding(task), task)
-        sizes = capacities(settings, network.inputs, network.outputs)
         episodes = in_capacity(sizes, (population.genomes,), run, episode_key, level, population.genomes)
         fitness = jnp.where(jnp.isnan(episodes.fitness), -jnp.inf, episodes.fitness)
         # The newest of equals, as everywhere in NEAT.
         best = settings.population - 1 - jnp.argmax(fitness[::-1])
         champion, episode = take_rows((population.genomes, episodes), best)
         following = next_population(
-            reproduction_key, settings, population, fitness, network.inputs, network.outputs, self.parents
+            reproduction_key, settings, sizes, population, fitness, network.inputs, network.outputs, self.parents
         )
         genomes = population.genomes
         metrics = {

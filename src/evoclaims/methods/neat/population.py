@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -13,7 +13,7 @@ from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 from evoclaims.core.keys import streams
 from evoclaims.core.pytree import pytree, select
 from evoclaims.kernels import take_rows
-from evoclaims.methods.neat.capacity import capacities, in_capacity
+from evoclaims.methods.neat.capacity import in_capacity
 from evoclaims.methods.neat.homology import crossover
 from evoclaims.methods.neat.mutation import draw, mutate_structure, mutate_values
 from evoclaims.methods.neat.settings import Settings, Species
@@ -145,6 +145,7 @@ def first_population(key: PRNGKeyArray, settings: Settings, inputs: int, outputs
 def next_population(
     key: PRNGKeyArray,
     settings: Settings,
+    sizes: Sequence[tuple[int, int]],
     population: Population,
     fitness: Float[Array, " population"],
     inputs: int,
@@ -153,7 +154,7 @@ def next_population(
 ) -> Population:
     """Replace all genomes except elites by offspring of the best of each species, whose parents `choose` draws.
 
-    A fitness of NaN counts as -inf.
+    It works in arrays of one of the capacities `sizes`, which makes no difference. A fitness of NaN counts as -inf.
     """
     parents_key, breeding_key = streams(key, "parents", "breeding")
     fitness = jnp.where(jnp.isnan(fitness), -jnp.inf, fitness)
@@ -161,7 +162,6 @@ def next_population(
     parents = choose(parents_key, settings.species, species, fitness)
     survivors = replace(population, species=species)
     breed = partial(_breed, settings, inputs, outputs)
-    sizes = capacities(settings, inputs, outputs)
     following: Population = in_capacity(
         sizes, (population.genomes, species.centres), breed, breeding_key, survivors, parents
     )
@@ -186,7 +186,7 @@ def _breed(
 ) -> Population:
     """Replace the genomes by the parents' children, in arrays of the given capacity."""
     crossover_key, mutation_key = streams(key, "crossover", "mutation")
-    small = _resized(population, nodes, connections)
+    small = in_arrays(population, nodes, connections)
     children = _crossed(crossover_key, small.genomes, parents)
 
     def mutated(key: PRNGKeyArray, genome: Genome, new_key: Array) -> Genome:
@@ -197,18 +197,21 @@ def _breed(
     size = parents.elite.shape[0]
     new_keys = population.next_key + jnp.arange(size, dtype=jnp.int32)
     mutants = jax.vmap(mutated)(jax.random.split(mutation_key, size), children, new_keys)
-    genomes = jax.vmap(select)(parents.elite, children, mutants)
+    bred = jax.vmap(select)(parents.elite, children, mutants)
     generation = population.generation + 1
     following = Population(
-        genomes=genomes,
-        species=speciate(settings.species, small.species, genomes, generation),
+        genomes=bred,
+        species=speciate(settings.species, small.species, bred, generation),
         generation=generation,
         next_key=population.next_key + size,
     )
-    return _resized(following, settings.nodes, settings.connections)
+    return in_arrays(
+        following, *(leaf.shape[-1] for leaf in (population.genomes.nodes.key, population.genomes.connections.source))
+    )
 
 
-def _resized(population: Population, nodes: int, connections: int) -> Population:
+def in_arrays(population: Population, nodes: int, connections: int) -> Population:
+    """Cut or pad the arrays to these capacities; what is cut off must be empty."""
     return replace(
         population,
         genomes=resized(population.genomes, nodes, connections),
