@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -14,9 +14,14 @@ from plane import Plane
 
 from evoclaims.core.errors import UserError
 from evoclaims.envs.base import Episode
+from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.neat.evolution import GenomeMethod
+from evoclaims.methods.neat.settings import Mutation, Settings, Species
+from evoclaims.trials.lanes import Lanes
+from evoclaims.trials.layout import Layout
+from evoclaims.trials.spec import Budget, Condition
 from reproductions.nisioti2025 import ecorobot
-from reproductions.nisioti2025.other_champions import OtherCmaEs, with_shared_starts
+from reproductions.nisioti2025.other_champions import BestEverNeat, OtherCmaEs, with_shared_starts
 from reproductions.nisioti2025.other_ppo import OtherPpo
 from reproductions.nisioti2025.other_stones import OtherStones
 from reproductions.nisioti2025.stones_details import as_kind, best_ever
@@ -27,6 +32,15 @@ TASK = OtherStones(episode_steps=10, pays="once")
 
 class Chancy(Plane):
     """A task whose episodes differ by chance, as the robots' do, and that compiles sooner than one with a robot."""
+
+    def episode(self, policy: Any, key: jax.Array, level: Any) -> Episode:
+        played = super().episode(policy, key, level)
+        return replace(played, fitness=played.fitness + jax.random.normal(key))
+
+
+@dataclass(frozen=True)
+class ChancyParity(NParity):
+    """The same for the engine, which asks more of a task than `Plane` has."""
 
     def episode(self, policy: Any, key: jax.Array, level: Any) -> Episode:
         played = super().episode(policy, key, level)
@@ -55,6 +69,30 @@ def test_neat_keeps_the_first_champion_until_an_episode_beats_it_and_evolves_as_
         assert all(map(np.array_equal, jax.tree.leaves(states["kept"].champion), jax.tree.leaves(genome)))
     same = map(np.array_equal, jax.tree.leaves(states["kept"].population), jax.tree.leaves(states["plain"].population))
     assert all(same)
+
+
+def test_side_by_side_neat_keeps_its_champion_too_in_arrays_of_several_sizes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("evoclaims.trials.lanes.layout_on", lambda platform: Layout.VECTOR)
+    monkeypatch.setattr("evoclaims.methods.neat.capacity.SMALLER", ((5, 7), (6, 9)))
+    settings = Settings(
+        population=12,
+        nodes=10,
+        connections=24,
+        mutation=Mutation(node_add=0.9, connection_add=0.9),
+        species=Species(most=3, survival=0.4),
+    )
+    task = ChancyParity(3)
+    condition = Condition(BestEverNeat(settings), task, "curriculum", Budget(generations=9))
+    lanes, best, places = Lanes(condition, jax.devices("cpu")[:1]), np.full(2, -np.inf), set()
+    with jax.debug_key_reuse(False):  # jax takes the keys of a condition under vmap for used
+        state = lanes.start([0, 1], 2)
+        for generation in range(1, 9):
+            method = state[0].method
+            places.add(int(jax.vmap(partial(condition.method.size_for, task))(method).max()))
+            state, report = lanes.advance(state, generation, 2)
+            best = np.maximum(best, report.fitness)
+            np.testing.assert_array_equal(state[0].method.episode.fitness, best)
+    assert places == {0, 1, 2}
 
 
 def test_shared_starts_give_every_key_the_mean_of_the_same_episodes() -> None:

@@ -85,18 +85,13 @@ class Resizable(Protocol):
     """A method whose steps are cheaper in smaller arrays, while its state fits them; the size makes no difference."""
 
     def sizes(self, task: Task) -> Sequence[Any]:
-        """Return the sizes, smallest first; the last is that of the state elsewhere."""
+        """Return the sizes, smallest first; every state fits the last."""
 
     def size_for(self, task: Task, state: Any) -> Int[Array, ""]:
         """Return the place of the smallest size that the next step fits."""
 
     def in_size(self, size: Any, state: Any) -> Any:
-        """Return the state in arrays of this size, for `step_in_size`, or back in those of the last."""
-
-    def step_in_size(
-        self, size: Any, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: Any
-    ) -> tuple[Any, Progress]:
-        """Do as `step`, in arrays of this size."""
+        """Return the state in arrays of a size, in which its steps stay; None for the state as everywhere else."""
 
 
 @runtime_checkable

@@ -21,9 +21,6 @@ from evoclaims.trials.spec import Condition
 
 NEVER = -1
 
-Take = Callable[..., tuple[Any, Progress]]
-"""Takes a step of a method: gets a key, the task, the level and the method's state."""
-
 
 @pytree
 class Ascent:
@@ -153,7 +150,7 @@ class Program:
 
     def advance(self, trial: TrialState, until: Int[Array, ""]) -> tuple[TrialState, Report]:
         """Take steps until the trial has ended or has taken `until` of them."""
-        step = partial(self._step, self.condition.method.step, _training_key(trial), self._task(trial))
+        step = partial(self._step, _training_key(trial), self._task(trial))
         trial = jax.lax.while_loop(lambda trial: self._running(trial, until), step, trial)
         return trial, self._report(trial)
 
@@ -169,18 +166,18 @@ class Program:
         def all_run(trials: TrialState) -> Bool[Array, ""]:
             return ~jnp.all(trials.idle) & jnp.all(trials.idle | jax.vmap(self._running)(trials, until))
 
-        def step(take: Take, trials: TrialState) -> TrialState:
-            return jax.vmap(partial(step_or_stay, take))(keys, trials)
+        def step(trials: TrialState) -> TrialState:
+            return jax.vmap(step_or_stay)(keys, trials)
 
-        def step_or_stay(take: Take, key: PRNGKeyArray, trial: TrialState) -> TrialState:
-            stepped = self._step(take, key, self._task(trial), trial)
+        def step_or_stay(key: PRNGKeyArray, trial: TrialState) -> TrialState:
+            stepped = self._step(key, self._task(trial), trial)
             small = select(trial.idle, replace(trial, method=()), replace(stepped, method=()))
             return replace(small, method=stepped.method)
 
         if isinstance(method, Resizable):
             trials = _in_sizes(method, self.condition.task, step, all_run, trials)
         else:
-            trials = jax.lax.while_loop(all_run, partial(step, method.step), trials)
+            trials = jax.lax.while_loop(all_run, step, trials)
         return trials, jax.vmap(self._report)(trials)
 
     def examine(self, trial: TrialState) -> Score:
@@ -197,11 +194,10 @@ class Program:
         """The shapes of what a step reports; cached, since tracing a step takes seconds."""
         return traced_progress(self.condition.method, self.condition.task)
 
-    def _step(self, take: Take, training_key: PRNGKeyArray, task: Task, trial: TrialState) -> TrialState:
-        """Let the method `take` a step."""
+    def _step(self, training_key: PRNGKeyArray, task: Task, trial: TrialState) -> TrialState:
         # The key depends on seed and step alone: a trial that continues from a checkpoint draws the same numbers.
         key = jax.random.fold_in(training_key, trial.steps)
-        state, progress = take(key, task, trial.ascent.level, trial.method)
+        state, progress = self.condition.method.step(key, task, trial.ascent.level, trial.method)
         steps = trial.steps + 1
         healthy = progress.healthy & jnp.isfinite(progress.fitness) & jnp.isfinite(progress.success)
         # A step that diverged never solves a level: its success may come from numbers that are not finite.
@@ -244,12 +240,11 @@ def _training_key(trial: TrialState) -> PRNGKeyArray:
 def _in_sizes(
     method: Resizable,
     task: Task,
-    step: Callable[[Take, TrialState], TrialState],
+    step: Callable[[TrialState], TrialState],
     go_on: Callable[[TrialState], Array],
     trials: TrialState,
 ) -> TrialState:
     """Let trials step while they `go_on`, in the smallest arrays that all of them fit: a loop for each size."""
-    sizes = method.sizes(task)
 
     def place(trials: TrialState) -> Array:
         return jnp.max(jax.vmap(partial(method.size_for, task))(trials.method))
@@ -257,14 +252,12 @@ def _in_sizes(
     def turned(size: Any, trials: TrialState) -> TrialState:
         return replace(trials, method=jax.vmap(partial(method.in_size, size))(trials.method))
 
-    def loop(here: int, trials: TrialState) -> TrialState:
+    def loop(here: int, size: Any, trials: TrialState) -> TrialState:
         def fit(trials: TrialState) -> Array:
             return go_on(trials) & (place(trials) == here)
 
-        take = partial(method.step_in_size, sizes[here])
-        small = jax.lax.while_loop(fit, partial(step, take), turned(sizes[here], trials))
-        return turned(sizes[-1], small)
+        return turned(None, jax.lax.while_loop(fit, step, turned(size, trials)))
 
-    loops = [partial(loop, here) for here in range(len(sizes))]
+    loops = [partial(loop, here, size) for here, size in enumerate(method.sizes(task))]
     made: TrialState = jax.lax.while_loop(go_on, lambda trials: jax.lax.switch(place(trials), loops, trials), trials)
     return made

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, ClassVar, Protocol
@@ -13,7 +12,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int, PRNGKeyArray
 
 from evoclaims.core.keys import streams
-from evoclaims.core.pytree import pytree, select
+from evoclaims.core.pytree import pytree, select, static
 from evoclaims.envs.base import Episode, Task
 from evoclaims.kernels import take_rows
 from evoclaims.methods.base import Policy, Progress
@@ -52,12 +51,15 @@ class Evolution:
         level: the level of the last evaluation.
         champion: the best genome of the last evaluation; leaves [nodes] and [connections].
         episode: the champion's episode.
+        size: the capacities (nodes, connections) of the genomes' arrays, in which steps stay; None for the largest,
+            where each step works in the smallest that do.
     """
 
     population: Population
     level: Int[Array, ""]
     champion: Genome
     episode: Episode
+    size: tuple[int, int] | None = static(default=None)
 
 
 class GenomeMethod(ABC):
@@ -89,40 +91,12 @@ class GenomeMethod(ABC):
         self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: Evolution
     ) -> tuple[Evolution, Progress]:
         """Evaluate the population on `level` and replace it by the next."""
-        return self._generation(self.sizes(task), key, task, level, state)
-
-    def sizes(self, task: Task) -> list[tuple[int, int]]:
-        """Return the capacities (nodes, connections) that a generation may work in, the largest last."""
-        network = self.network(task)
-        return capacities(self.settings, network.inputs, network.outputs)
-
-    def size_for(self, task: Task, state: Evolution) -> Int[Array, ""]:
-        """Return the place of the smallest size that the next generation fits."""
-        return fitting(self.sizes(task), (state.population.genomes, state.population.species.centres))
-
-    def in_size(self, size: tuple[int, int], state: Evolution) -> Evolution:
-        """Cut or pad the genomes; a champion that is cut off is replaced by the next step's."""
-        return replace(state, population=in_arrays(state.population, *size), champion=resized(state.champion, *size))
-
-    def step_in_size(
-        self, size: tuple[int, int], key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: Evolution
-    ) -> tuple[Evolution, Progress]:
-        """Do as `step`, in arrays of this size, which the generation must fit."""
-        return self._generation([size], key, task, level, state)
-
-    def _generation(
-        self,
-        sizes: Sequence[tuple[int, int]],
-        key: PRNGKeyArray,
-        task: Task,
-        level: Int[Array, ""],
-        state: Evolution,
-    ) -> tuple[Evolution, Progress]:
         network, settings, population = self.network(task), self.settings, state.population
         if settings.species.on_level_up == "reset":
             population = select(level == state.level, population, forget_records(population))
         episode_key, reproduction_key = streams(key, "episode", "reproduction")
         run = partial(_evaluate, self.encoding(task), task)
+        sizes = [state.size] if state.size else self.sizes(task)
         episodes = in_capacity(sizes, (population.genomes,), run, episode_key, level, population.genomes)
         fitness = jnp.where(jnp.isnan(episodes.fitness), -jnp.inf, episodes.fitness)
         # The newest of equals, as everywhere in NEAT.
@@ -142,7 +116,24 @@ class GenomeMethod(ABC):
         genes = champion.nodes.bias, champion.nodes.response, champion.connections.weight
         healthy = jnp.all(jnp.isfinite(jnp.concatenate([*genes, episode.fitness[None]])))
         progress = Progress(fitness=episode.fitness, success=episode.success, healthy=healthy, metrics=metrics)
-        return Evolution(population=following, level=level, champion=champion, episode=episode), progress
+        after = Evolution(population=following, level=level, champion=champion, episode=episode, size=state.size)
+        return after, progress
+
+    def sizes(self, task: Task) -> list[tuple[int, int]]:
+        """Return the capacities (nodes, connections) that a generation may work in, the largest last."""
+        network = self.network(task)
+        return capacities(self.settings, network.inputs, network.outputs)
+
+    def size_for(self, task: Task, state: Evolution) -> Int[Array, ""]:
+        """Return the place of the smallest size that the next generation fits."""
+        population = state.population
+        return fitting(self.sizes(task), (population.genomes, population.species.centres, state.champion))
+
+    def in_size(self, size: tuple[int, int] | None, state: Evolution) -> Evolution:
+        """Return the state in arrays of a size in which its steps stay; None for the largest, where they choose."""
+        most = size or (self.settings.nodes, self.settings.connections)
+        champion = resized(state.champion, *most)
+        return replace(state, population=in_arrays(state.population, *most), champion=champion, size=size)
 
     def parents(self, *chosen_from: Any) -> Parents:
         """Draw the parents of the next population; the arguments are those of `choose_parents`."""
