@@ -1,17 +1,14 @@
-"""The full tier, which no CI runs: its methods and tasks at least fit, begin and trace a step of several trials."""
+"""The full tier, which no CI runs: its methods and tasks at least fit, begin and trace steps of several trials."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import jax
 import jax.numpy as jnp
 import pytest
 
 from evoclaims.core.errors import UserError
-from evoclaims.envs.base import Numbered
 from evoclaims.envs.gates.circuit import Circuit
-from evoclaims.trials.compatibility import traced_progress
+from evoclaims.trials.program import Program
 from evoclaims.trials.spec import Condition
 from reproductions.nisioti2025 import REPRODUCTION
 
@@ -31,23 +28,15 @@ ROBOTS = {(type(c.task), getattr(c.task, "robot", None)): names for names, c in 
     "condition",
     [pytest.param(CONDITIONS[n], id="-".join(n)) for n in dict.fromkeys([*KINDS.values(), *ROBOTS.values()])],
 )
-def test_a_condition_of_the_full_tier_traces_a_step_of_two_trials(condition: Condition) -> None:
-    method, task = condition.method, condition.task
-    keys = jax.random.split(jax.random.key(0), 2)
+def test_a_condition_of_the_full_tier_traces_steps_of_two_trials_side_by_side(condition: Condition) -> None:
+    """As on an accelerator."""
+    program, two = Program(condition), jnp.arange(2)
     try:
-        traced_progress(method, task)
+        state = jax.eval_shape(jax.vmap(program.start), two, two > 2)
     except UserError as error:
-        if not getattr(method, "optional", False):
+        if not getattr(condition.method, "optional", False):
             raise
         pytest.skip(str(error))
-    state = jax.eval_shape(jax.vmap(lambda key: method.init(key, task)), keys)
-    # On an accelerator trials are a batch, each with the numbers of its task (`Program`).
-    numbers = jax.tree.map(lambda x: jnp.stack([x, x]), task.numbers) if isinstance(task, Numbered) else ()
-
-    def step(key: Any, numbers: Any, state: Any) -> Any:
-        own = task.with_numbers(numbers) if isinstance(task, Numbered) else task
-        return method.step(key, own, jnp.int32(0), state)
-
-    following, progress = jax.eval_shape(jax.vmap(step), keys, numbers, state)
+    following, report = jax.eval_shape(program.advance_together, state, two)
     assert jax.tree.structure(following) == jax.tree.structure(state)
-    assert progress.fitness.shape == (2,)
+    assert report.fitness.shape == (2,)
