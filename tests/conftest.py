@@ -123,7 +123,9 @@ def installed() -> list[Installed]:
 @pytest.fixture
 def pytester(
     all_imported: None, installed: list[Installed], pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
-) -> pytest.Pytester:
+) -> Iterator[pytest.Pytester]:
     """pytest's own, which forgets the modules that a test has imported first: their classes would be there twice."""
     monkeypatch.setattr("importlib.metadata.distributions", lambda: installed)
-    return pytester
+    gc.freeze()  # every run of pytest ends with five garbage collections, of all that earlier tests have traced
+    yield pytester
+    gc.unfreeze()
