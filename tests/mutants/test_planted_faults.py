@@ -15,8 +15,11 @@ from evoclaims.core.errors import UserError
 from evoclaims.envs.base import Episode, PolicyFn
 from evoclaims.envs.gates.alu import SimpleAlu
 from evoclaims.envs.gates.parity import NParity
+from evoclaims.methods.base import Resizable
 from evoclaims.methods.cma_es import CmaEs
 from evoclaims.methods.hand_built import HandBuilt
+from evoclaims.methods.neat.evolution import Neat
+from evoclaims.methods.neat.settings import Settings, Species
 from evoclaims.methods.random_search import RandomSearch
 from evoclaims.mutants import faults
 from evoclaims.mutants.faults import plant
@@ -190,3 +193,14 @@ def test_the_engine_runs_a_mutant_as_any_other_condition(name: str) -> None:
         return program.examine(program.advance(trial, jnp.int32(3))[0]).final.success
 
     assert jax.eval_shape(whole, jnp.int32(0)).shape == (PARITY.levels,)
+
+
+@pytest.mark.parametrize("fault", [None, faults.HasOneSeed, faults.ForgetsChampion])
+def test_a_fault_in_neat_is_traced_side_by_side_too(fault: type[Any] | None) -> None:
+    sound = Neat(Settings(population=8, nodes=8, connections=12, species=Species(most=3)))
+    method = plant(fault, sound) if fault else sound
+    assert isinstance(method, Resizable) is (fault is not faults.HasOneSeed)
+    program, two = Program(condition(method)), jnp.arange(2)
+    state = jax.eval_shape(jax.vmap(program.start), two, two > 2)
+    following, _ = jax.eval_shape(program.advance_together, state, two)
+    assert jax.tree.structure(following) == jax.tree.structure(state)

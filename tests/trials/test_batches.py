@@ -132,6 +132,19 @@ def test_side_by_side_a_batch_ends_when_nothing_is_owed_though_a_stored_trial_ru
     assert max(others) <= max(steps for steps, _ in side_by_side) < late.metrics["steps"]
 
 
+def test_side_by_side_a_checkpoint_that_marks_no_stored_trial_as_idle_goes_on_too(
+    store: Store, tmp_path: Path, cpus: list[Any], side_by_side: list[tuple[int, int]]
+) -> None:
+    """As they were written before a trial was made idle when it had been stored."""
+    wanted = run_climbers(Store(tmp_path / "whole"), cpus)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Lanes, "with_idle", lambda self, state, idle: state)
+        with pytest.raises(RuntimeError, match="shared a program"):
+            run_climbers(store, cpus)
+    assert 0 < len(store.ids()) < len(SEEDS)
+    assert digests(run_climbers(store, cpus)) == digests(wanted)
+
+
 @pytest.mark.parametrize("layout", Layout)
 def test_side_by_side_a_batch_goes_on_with_as_many_devices_as_it_had_and_alone_with_any_number(
     layout: Layout, store: Store, cpus: list[Any], uninterrupted: list[TrialResult], monkeypatch: pytest.MonkeyPatch

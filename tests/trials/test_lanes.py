@@ -100,18 +100,21 @@ def test_each_size_of_a_share_is_compiled_once_a_device_in_a_run(
 ) -> None:
     monkeypatch.setattr("evoclaims.trials.lanes.layout_on", lambda platform: layout)
     sizes: Counter[int] = Counter()
-    compile_size = Lanes._compile
+    compile_size, finish = Lanes._compile, Lanes._finished
+    finished: list[Any] = []
 
     def spy(self: Lanes, size: int, homes: Sequence[jax.Device]) -> dict[jax.Device, Compiled]:
         sizes.update({size: len(homes)})
         return compile_size(self, size, homes)
 
     monkeypatch.setattr(Lanes, "_compile", spy)
+    monkeypatch.setattr(Lanes, "_finished", lambda self, lowered: finished.append(lowered) or finish(self, lowered))
     with jax.log_compiles(), caplog.at_level(logging.WARNING, "jax"):
         results = run(walk(chance=0.35, hazard=0.04), range(1, 6), Store(tmp_path), cpus)
     assert sizes == ({1: 1} if layout.alone else {3: 2, 1: 2})  # lanes of a share, on how many devices
-    compiled = [r for r in caplog.records if r.getMessage().startswith("Compiling ")]  # lowering, once for all devices
-    assert len(compiled) == 1 + 2 * len(sizes), [r.getMessage() for r in compiled]
+    assert len(finished) == (1 if layout.alone else 2) + 2 * sizes.total()
+    lowered = [r for r in caplog.records if r.getMessage().startswith("Compiling ")]  # lowering, once for all devices
+    assert len(lowered) == 1 + 2 * len(sizes), [r.getMessage() for r in lowered]
     assert len({result.metrics["steps"] for result in results}) > 1
 
 

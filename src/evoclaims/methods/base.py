@@ -82,16 +82,19 @@ class Method(Protocol[S]):
 
 @runtime_checkable
 class Resizable(Protocol):
-    """A method whose steps are cheaper in smaller arrays, while its state fits them; the size makes no difference."""
+    """A method whose steps are cheaper in smaller arrays, while its state fits them; the size makes no difference.
+
+    A subclass with another state overrides the three functions, or sets them to None and works in the largest arrays.
+    """
 
     def sizes(self, task: Task) -> Sequence[Any]:
         """Return the sizes, smallest first; every state fits the last."""
 
     def size_for(self, task: Task, state: Any) -> Int[Array, ""]:
-        """Return the place of the smallest size that the next step fits."""
+        """Return the place of the smallest size that the next step fits, the same whatever arrays the state is in."""
 
     def in_size(self, size: Any, state: Any) -> Any:
-        """Return the state in arrays of a size, in which its steps stay; None for the state as everywhere else."""
+        """Return the state in arrays of a size, which `step` keeps; None for the state as everywhere else."""
 
 
 @runtime_checkable

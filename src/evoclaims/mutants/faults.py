@@ -252,6 +252,8 @@ class HasOneSeed(Fault):
 
     says: ClassVar[str] = "has one seed"
 
+    sizes = size_for = in_size = None  # the state is another one: see `Resizable`
+
     def init(self, key: PRNGKeyArray, task: Task) -> tuple[Int[Array, ""], Any]:
         """Start from a fixed key, and count steps from now on."""
         return jnp.zeros((), jnp.int32), self.sound.init(jax.random.key(0), task)

@@ -207,8 +207,9 @@ def _resumed(run: Run, interrupted: Header) -> Batch | None:
     if lanes.layout.alone:
         # Bits do not depend on other lanes: a lane whose trial is stored becomes idle, and costs nothing.
         header = replace(header, lanes=[None if seed in stored else seed for seed in header.lanes])
-        state = replace(state, idle=state.idle | np.array([seed is None for seed in header.lanes]))
         stored = frozenset()
+    # Before 24342677 lanes of stored trials were not marked in the state.
+    state = replace(state, idle=state.idle | np.array([seed is None for seed in header.lanes]))
     return Batch(header, lanes.place(state, len(header.lanes)), int(np.max(state.steps)), stored)
 
 

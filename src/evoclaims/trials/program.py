@@ -1,4 +1,4 @@
-"""The three programs of a condition (start, advance, examine), written for one trial."""
+"""The three programs of a condition: start, advance, examine."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ class TrialState:
 
 @pytree
 class Report:
-    """What the host reads after each chunk: small scalars per trial."""
+    """What the host reads after each call: small scalars per trial."""
 
     steps: Int[Array, ""]
     level: Int[Array, ""]
@@ -124,7 +124,7 @@ class Score:
 
 @dataclass(frozen=True)
 class Program:
-    """The pure functions of one condition, each for a single trial."""
+    """The pure functions of one condition, for a single trial unless they say otherwise."""
 
     condition: Condition
 
@@ -244,7 +244,10 @@ def _in_sizes(
     go_on: Callable[[TrialState], Array],
     trials: TrialState,
 ) -> TrialState:
-    """Let trials step while they `go_on`, in the smallest arrays that all of them fit: a loop for each size."""
+    """Let trials step while they `go_on`, in the smallest arrays that all of them fit: a loop for each size.
+
+    Idle trials count, too: they go on changing, and kernels rely on a state that is whole.
+    """
 
     def place(trials: TrialState) -> Array:
         return jnp.max(jax.vmap(partial(method.size_for, task))(trials.method))

@@ -186,10 +186,12 @@ def _go_on(run: Run, batch: Batch, allowance: Allowance, strides: Strides) -> tu
         others = [lane for lane in batch.running if not report.ended[lane]]
         level = all(report.steps[lane] >= until for lane in others)
         whole = level and (until == chunk_end or not others)
-        batch = _with_points(run, batch, report, batch.running if whole else ended)
-        assert level or ended, "trials that had taken different numbers of steps shared a program"
-        if ended:
-            batch = _store_ended(run, batch, report, ended, allowance)
+        if not (level or ended):
+            raise RuntimeError("Trials that had taken different numbers of steps, or had ended, shared a program.")
+        if whole or not run.lanes.layout.alone:  # alone, a trial that has ended waits unchanged for the chunk's end
+            batch = _with_points(run, batch, report, batch.running if whole else ended)
+            if ended:
+                batch = _store_ended(run, batch, report, ended, allowance)
     strides.took(until - batch.steps, batch.header.run_seconds - ran)
     batch = replace(batch, steps=until)
     if not whole:
@@ -304,10 +306,10 @@ def _progress(run: Run, batch: Batch, report: Report, strides: Strides) -> RunPr
 
 
 class Strides:
-    """How many steps to run per device call: one at first, then as many as the last call's speed allows.
+    """How many steps to run at a time: one at first, then as many as the last stride's speed allows.
 
     Attributes:
-        seconds: duration of the last call.
+        seconds: the device's time for the last stride, of one call or, where trials ended, of several.
     """
 
     def __init__(self) -> None:

@@ -93,12 +93,14 @@ def test_trials_side_by_side_have_the_same_structure_and_nearly_the_same_numbers
     monkeypatch.setattr("evoclaims.methods.neat.capacity.SMALLER", ((4, 5), (5, 7)))
     grown = [max(result.curves["champion_connections"]) for result in batch]
     assert max(grown) + 2 > 7  # so that the largest are needed; the first networks fit the smallest
-    store = Store(tmp_path)
+    store, sizes, in_size = Store(tmp_path), set(), Neat.in_size
+    monkeypatch.setattr(Neat, "in_size", lambda self, size, state: sizes.add(size) or in_size(self, size, state))
     for one, other in zip(batch, run(CONDITION, SEEDS, store, device), strict=True):
         assert (one.seed, one.status, one.levels["solved_at"]) == (other.seed, other.status, other.levels["solved_at"])
         assert one.curves.keys() == other.curves.keys()
         for name, curve in one.curves.items():
             np.testing.assert_allclose(curve, other.curves[name], rtol=1e-5, err_msg=name)
+    assert sizes == {(4, 5), (5, 7), (10, 24), None}
 
 
 class StoppedError(Exception):

@@ -52,7 +52,7 @@ class Evolution:
         champion: the best genome of the last evaluation; leaves [nodes] and [connections].
         episode: the champion's episode.
         size: the capacities (nodes, connections) of the genomes' arrays, in which steps stay; None for the largest,
-            where each step works in the smallest that do.
+            where each step works in the smallest that suffice.
     """
 
     population: Population

@@ -205,9 +205,8 @@ def _breed(
         generation=generation,
         next_key=population.next_key + size,
     )
-    return in_arrays(
-        following, *(leaf.shape[-1] for leaf in (population.genomes.nodes.key, population.genomes.connections.source))
-    )
+    given = population.genomes
+    return in_arrays(following, given.nodes.key.shape[-1], given.connections.source.shape[-1])
 
 
 def in_arrays(population: Population, nodes: int, connections: int) -> Population:
