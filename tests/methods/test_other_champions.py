@@ -17,7 +17,6 @@ from evoclaims.envs.base import Episode
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.neat.evolution import GenomeMethod
 from evoclaims.methods.neat.settings import Mutation, Settings, Species
-from evoclaims.networks.genome import EMPTY
 from evoclaims.trials.lanes import Lanes
 from evoclaims.trials.layout import Layout
 from evoclaims.trials.spec import Budget, Condition
@@ -93,8 +92,6 @@ def test_side_by_side_neat_keeps_its_champion_too_in_arrays_of_several_sizes(mon
             state, report = lanes.advance(state, generation, 2)
             best = np.maximum(best, report.fitness)
             np.testing.assert_array_equal(state[0].method.episode.fitness, best)
-            champion = state[0].method.champion
-            np.testing.assert_array_equal((champion.nodes.key != EMPTY).sum(axis=1), champion.node_count)  # none is cut
             assert report.level.tolist() == [0, 0]
     assert places == {0, 1, 2}
 

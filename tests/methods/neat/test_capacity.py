@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 from genomes import made, stacked
 
+from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.neat import capacity
-from evoclaims.methods.neat.settings import Settings
+from evoclaims.methods.neat.evolution import Neat
+from evoclaims.methods.neat.settings import Settings, Species
 
 ALL = [(32, 96), (100, 200), (100, 400)]
 
@@ -63,3 +65,11 @@ def test_arrays_have_room_for_one_more_node_and_two_more_connections(
             capacity.capacities(Settings(), 2, 1), groups, lambda n, c, _: size(n, c), jnp.zeros(())
         )
         assert tuple(np.asarray(chosen).tolist()) == wanted
+
+
+def test_arrays_fit_a_champion_that_is_larger_than_all_genomes() -> None:
+    """A method may keep one from long ago."""
+    method, task = Neat(Settings(population=8, species=Species(most=3))), NParity(3)
+    state = jax.jit(lambda key: method.init(key, task))(jax.random.key(0))
+    assert int(method.size_for(task, state)) == 0
+    assert int(method.size_for(task, replace(state, champion=replace(state.champion, node_count=np.int32(40))))) == 1
