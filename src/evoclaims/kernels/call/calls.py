@@ -8,6 +8,7 @@ from functools import cache, partial
 from typing import Any, Final, Protocol
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jax.core import ShapedArray
 from jax.extend.core import Primitive
@@ -34,7 +35,12 @@ class Callee(Protocol):
         """Return the batch dimensions of arguments."""
 
     def in_front(self, leaves: Sequence[Array], axes: Sequence[int | None]) -> list[Array]:
-        """Add a batch dimension, which each argument has at its axis, in front of the others."""
+        """Add a batch dimension, which each argument has at its axis, in front of the others; copy one without it."""
+        size = next(leaf.shape[axis] for leaf, axis in zip(leaves, axes, strict=True) if axis is not None)
+        return [
+            jnp.broadcast_to(leaf, (size, *leaf.shape)) if axis is None else jnp.moveaxis(leaf, axis, 0)
+            for leaf, axis in zip(leaves, axes, strict=True)
+        ]
 
     def as_it_is(self, *leaves: Array) -> list[Array]:
         """Call the function itself."""
@@ -43,7 +49,8 @@ class Callee(Protocol):
         """Call the kernel for this machine's processor."""
 
     def on_gpu(self, *leaves: Array) -> list[Array]:
-        """Call the kernel for NVIDIA's GPUs."""
+        """Call the kernel for NVIDIA's GPUs, or what is faster there: the function itself."""
+        return self.as_it_is(*leaves)
 
 
 def on_host(text: str, layout: Sequence[int], operands: Sequence[Array], shapes: Shapes) -> Any:

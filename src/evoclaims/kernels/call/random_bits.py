@@ -77,8 +77,8 @@ _GENERATOR: Final = define_prng_impl(
 
 
 @dataclass(frozen=True)
-class _Drawing:
-    """The kernel that draws `size` numbers with a key (a `calls.Callee`); its text is the same for all sizes."""
+class _Drawing(calls.Callee):
+    """The kernel that draws `size` numbers with a key; for GPUs jax has one. Its text is the same for all sizes."""
 
     size: int
 
@@ -92,44 +92,32 @@ class _Drawing:
         shape: tuple[int, ...] = leaves[0].shape[:-1]
         return shape
 
-    def in_front(self, leaves: Sequence[Array], axes: Sequence[int | None]) -> list[Array]:
-        """Add a batch dimension in front of the others."""
-        return [jnp.moveaxis(leaf, axis or 0, 0) for leaf, axis in zip(leaves, axes, strict=True)]
-
-    def as_it_is(self, key: Array) -> list[Array]:
+    def as_it_is(self, *keys: Array) -> list[Array]:
         """Draw by jax's own generator."""
+        (key,) = keys
         if key.ndim > 1:
             made: list[Array] = jax.vmap(self.as_it_is)(key)
             return made
         return [threefry_prng_impl.random_bits(key, 32, (self.size,))]
 
-    def on_host(self, key: Array) -> list[Array]:
+    def on_host(self, *keys: Array) -> list[Array]:
         """Draw by the kernel for this machine's processor."""
-        batch = self.batch([key])
-        keys = math.prod(batch)
-        if not keys:
+        batch = self.batch(keys)
+        count = math.prod(batch)
+        if not count:
             return [jnp.zeros((*batch, self.size), jnp.uint32)]
-        shapes = [jax.ShapeDtypeStruct((keys, self.size), jnp.uint32)]
-        (bits,) = calls.on_host(_drawing(machine_code.lanes()), [keys, self.size], [key.reshape(keys, 2)], shapes)
+        shapes = [jax.ShapeDtypeStruct((count, self.size), jnp.uint32)]
+        operands = [keys[0].reshape(count, 2)]
+        (bits,) = calls.on_host(_drawing(machine_code.lanes()), [count, self.size], operands, shapes)
         return [bits.reshape(*batch, self.size)]
-
-    def on_gpu(self, key: Array) -> list[Array]:
-        """Draw by jax's own generator, which has a kernel for GPUs."""
-        return self.as_it_is(key)
 
 
 @cache
 def _drawing(lanes: int) -> str:
     """Return the text of the kernel that draws numbers, in vectors; the last one is stored in part."""
-    page = Instructions(1)
     width = LANES * lanes
-    vector = f"<{width} x i32>"
-    places = f"<{', '.join(f'i32 {place}' for place in range(width))}>"
-
-    def everywhere(number: str) -> str:
-        one = page.put(f"insertelement {vector} poison, i32 {number}, i64 0")
-        return page.put(f"shufflevector {vector} {one}, {vector} poison, {vector} zeroinitializer")
-
+    page = Instructions(width)
+    vector, places = page.vector("i32"), page.numbers_of_lanes()
     page.label("entry")
     keys, size = (page.put(f"trunc i64 {number} to i32") for number in ("%keys", "%size"))
     whole = page.put(f"sdiv i32 {size}, {width}")
@@ -139,12 +127,12 @@ def _drawing(lanes: int) -> str:
         wide = page.put(f"zext i32 {number} to i64")
         key = page.put(f"getelementptr i32, ptr %a0, i64 {page.put(f'mul i64 {wide}, 2')}")
         row = page.put(f"getelementptr i32, ptr %z0, i64 {page.put(f'mul i64 {wide}, %size')}")
-        rounds = [everywhere(part) for part in _three_keys(page, key)]
+        rounds = [page.in_all_lanes("i32", part) for part in _three_keys(page, key)]
 
         def drawn(block: str) -> tuple[str, str]:
             begin = page.put(f"mul i32 {block}, {width}")
-            counters = page.put(f"add {vector} {everywhere(begin)}, {places}")
-            first, second = _block(page, width, rounds, counters)
+            counters = page.put(f"add {vector} {page.in_all_lanes('i32', begin)}, {places}")
+            first, second = _block(page, rounds, counters)
             return begin, page.put(f"xor {vector} {first}, {second}")
 
         def draw_all(block: str) -> list[str]:
@@ -154,10 +142,10 @@ def _drawing(lanes: int) -> str:
 
         def draw_some(block: str) -> list[str]:
             begin, bits = drawn(block)
-            left = everywhere(page.put(f"sub i32 {size}, {begin}"))
-            inside = (f"<{width} x i1>", page.put(f"icmp slt {vector} {places}, {left}"))
+            left = page.in_all_lanes("i32", page.put(f"sub i32 {size}, {begin}"))
+            inside = (page.vector("i1"), page.put(f"icmp slt {vector} {places}, {left}"))
             operands = [(vector, bits), ("ptr", at(page, row, begin)), ("i32", "4"), inside]
-            page.call(f"llvm.masked.store.v{width}i32.p0", "void", operands)
+            page.call(f"{page.mangled('masked.store', 'i32')}.p0", "void", operands)
             return []
 
         repeat(page, "0", whole, [], draw_all)
@@ -183,7 +171,7 @@ def _write_folded(rows: Rows, groups: Sequence[str], given: Sequence[str], resul
 
     def fold(row: str) -> list[str]:
         twice = page.put(f"mul i32 {row}, 2")
-        words = _block(page, 1, _three_keys(page, at(page, keys, twice)), load(page, data, row))
+        words = _block(page, _three_keys(page, at(page, keys, twice)), load(page, data, row))
         for place, word in enumerate(words):
             store(page, word, at(page, made, twice), str(place))
         return []
@@ -211,21 +199,17 @@ def _three_keys(page: Instructions, key: str) -> list[str]:
     return [first, second, third]
 
 
-def _block(page: Instructions, width: int, keys: Sequence[str], counters: str) -> tuple[str, str]:
-    """Write Threefry-2x32 of (0, counter) for `width` counters, in vectors if it is not 1; return both words."""
-    type_ = "i32" if width == 1 else f"<{width} x i32>"
-    turn = f"llvm.fshl.{'' if width == 1 else f'v{width}'}i32"
-
-    def known(number: int) -> str:
-        return str(number) if width == 1 else f"splat (i32 {number})"
-
+def _block(page: Instructions, keys: Sequence[str], counters: str) -> tuple[str, str]:
+    """Write Threefry-2x32 of (0, counter) for a counter in each lane; return both words."""
+    type_ = page.vector("i32")
     x, y = keys[0], page.put(f"add {type_} {counters}, {keys[1]}")
     for group in range(5):
         for rotation in ROTATIONS[group % 2]:
             x = page.put(f"add {type_} {x}, {y}")
-            turned = page.call(turn, type_, [(type_, y), (type_, y), (type_, known(rotation))])
+            turns = page.splat("i32", str(rotation))
+            turned = page.call(page.mangled("fshl", "i32"), type_, [(type_, y), (type_, y), (type_, turns)])
             y = page.put(f"xor {type_} {turned}, {x}")
         x = page.put(f"add {type_} {x}, {keys[(group + 1) % 3]}")
-        added = page.put(f"add {type_} {keys[(group + 2) % 3]}, {known(group + 1)}")
+        added = page.put(f"add {type_} {keys[(group + 2) % 3]}, {page.splat('i32', str(group + 1))}")
         y = page.put(f"add {type_} {y}, {added}")
     return x, y

@@ -51,8 +51,8 @@ def _is_copied(leaf: Array) -> bool:
 
 
 @dataclass(frozen=True)
-class _Taking:
-    """The kernel (a `calls.Callee`); its text is the same for all sizes.
+class _Taking(calls.Callee):
+    """The kernel; its text is the same for all sizes.
 
     Attributes:
         places: the shape of the places.
@@ -72,26 +72,20 @@ class _Taking:
         shape: tuple[int, ...] = leaves[0].shape
         return shape[: len(shape) - len(self.places)]
 
-    def in_front(self, leaves: Sequence[Array], axes: Sequence[int | None]) -> list[Array]:
-        """Add a batch dimension in front of the others."""
-        size = next(leaf.shape[axis] for leaf, axis in zip(leaves, axes, strict=True) if axis is not None)
-        return [
-            jnp.broadcast_to(leaf, (size, *leaf.shape)) if axis is None else jnp.moveaxis(leaf, axis, 0)
-            for leaf, axis in zip(leaves, axes, strict=True)
-        ]
-
-    def as_it_is(self, places: Array, *arrays: Array) -> list[Array]:
+    def as_it_is(self, *leaves: Array) -> list[Array]:
         """Index the arrays, for every element of a batch."""
-        if self.batch([places]):
-            made: list[Array] = jax.vmap(self.as_it_is)(places, *arrays)
+        if self.batch(leaves):
+            made: list[Array] = jax.vmap(self.as_it_is)(*leaves)
             return made
+        places, *arrays = leaves
         return [array[places] for array in arrays]
 
-    def on_host(self, places: Array, *arrays: Array) -> list[Array]:
+    def on_host(self, *leaves: Array) -> list[Array]:
         """Call the kernel for this machine's processor; not for batches, which no program for processors has."""
         shapes, count = self.outputs, math.prod(self.places)
-        if self.batch([places]) or not all(math.prod(each.shape) for each in shapes):
-            return self.as_it_is(places, *arrays)
+        if self.batch(leaves) or not all(math.prod(each.shape) for each in shapes):
+            return self.as_it_is(*leaves)
+        places, *arrays = leaves
         numbers = [math.prod(each.shape[1:]) for each in self.arrays]
         sizes = [size * each.dtype.itemsize for size, each in zip(numbers, self.arrays, strict=True)]
         layout = [count, self.arrays[0].shape[0], *sizes]
@@ -99,10 +93,6 @@ class _Taking:
         operands = [places.reshape(-1), *arrays]
         made = calls.on_host(_text(len(arrays)), layout, operands, flat)
         return [rows.reshape(each.shape) for rows, each in zip(made, shapes, strict=True)]
-
-    def on_gpu(self, *leaves: Array) -> list[Array]:
-        """Index the arrays."""
-        return self.as_it_is(*leaves)
 
 
 @cache

@@ -10,7 +10,7 @@ import jax
 
 from evoclaims.kernels.emit.gpu_instructions import GpuInstructions
 from evoclaims.kernels.emit.gpu_kernel import BLOCK, SMALL, Element, finished, parameters
-from evoclaims.kernels.emit.llvm_ir import TYPES, ArrayRow, Instructions, either
+from evoclaims.kernels.emit.llvm_ir import TYPES, ArrayRow, Instructions
 from evoclaims.kernels.emit.shared_slots import Slots, slots
 from evoclaims.kernels.emit.warp_schedule import Phase, Schedule, Segment, schedule
 from evoclaims.kernels.trace.expressions import (
@@ -181,20 +181,17 @@ class _Warp:
         """Write a loop; its carry stays in slots."""
         page, around = self._page, segment.loop
         assert around
-        before, again, after = page.block, f"{page.block}.again", f"{page.block}.after"
-        page.write(f"br label %{again}")
-        page.label(again)
-        head, rounds = len(page.lines), page.register()
-        self._compute(segment.phases)
-        if around.choice:
-            self._choose(around, around.choice, segment.ways)
-        else:
-            self._pass_on(around, around.results)
-        self._barrier()
-        more = page.put(f"add i32 {rounds}, 1")
-        page.lines.insert(head, either(rounds, "i32", ("0", before), (more, page.block)))
-        page.write(f"br i1 {page.put(f'icmp ult i32 {more}, {around.rounds}')}, label %{again}, label %{after}")
-        page.label(after)
+
+        def body(_: Sequence[str]) -> list[str]:
+            self._compute(segment.phases)
+            if around.choice:
+                self._choose(around, around.choice, segment.ways)
+            else:
+                self._pass_on(around, around.results)
+            self._barrier()
+            return []
+
+        page.repeat(f"{page.block}.{{}}", around.rounds, [], [], body)
 
     def _choose(self, around: Loop, choice: Choice, ways: Sequence[Sequence[Phase]]) -> None:
         """Write both ways to the carry of a loop; all warps of a block take the same one."""

@@ -44,8 +44,7 @@ class Rows:
         """Start; lanes from `count`, an i32, on compute the last row, and store nothing."""
         self.page, self.count = page, count
         if page.lanes > 1:
-            integers = page.vector("i32")
-            numbers = f"<{', '.join(f'i32 {lane}' for lane in range(page.lanes))}>"
+            integers, numbers = page.vector("i32"), page.numbers_of_lanes()
             self._inside = page.put(f"icmp slt {integers} {numbers}, {page.in_all_lanes('i32', count)}")
             last = page.in_all_lanes("i32", page.put(f"sub i32 {count}, 1"))
             self._lane = page.call(page.mangled("smin", "i32"), integers, [(integers, numbers), (integers, last)])

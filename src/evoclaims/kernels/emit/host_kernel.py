@@ -121,8 +121,7 @@ def _block(page: Instructions, results: Sequence[Numbers], arrays: Mapping[int, 
     left = page.put("sub i64 %last, %row")
     few = page.call("llvm.umin.i64", "i64", [("i64", left), ("i64", str(lanes - 1))])
     last = page.in_all_lanes("i32", page.put(f"trunc i64 {few} to i32"))
-    numbers = f"<{', '.join(f'i32 {lane}' for lane in range(lanes))}>"
-    lane = page.call(page.mangled("umin", "i32"), integers, [(integers, numbers), (integers, last)])
+    lane = page.call(page.mangled("umin", "i32"), integers, [(integers, page.numbers_of_lanes()), (integers, last)])
     rows = {array: _rows(page, array, row, lane) for array, row in arrays.items()}
     everywhere = page.splat("i1", "true")
 

@@ -199,6 +199,10 @@ class Instructions:
         """Return a constant in all lanes."""
         return value if self.lanes == 1 else f"splat ({type_} {value})"
 
+    def numbers_of_lanes(self) -> str:
+        """Return the vector of the lanes' numbers, 0, 1, …, as i32."""
+        return f"<{', '.join(f'i32 {lane}' for lane in range(self.lanes))}>"
+
     def in_all_lanes(self, type_: str, value: str) -> str:
         """Copy a number into all lanes."""
         if self.lanes == 1:
@@ -312,21 +316,42 @@ class Instructions:
         """Write a loop; return its results' registers."""
         self.compute(in_order(loop.taken), registers, load)
         self._loops += 1
-        again, after = f"again{self._loops}", f"after{self._loops}"
-        before, start = self.block, [self.operand(s, registers) for s in loop.start]
+
+        def body(carried: Sequence[str]) -> list[str]:
+            inside = {**registers, **{id(c): register for c, register in zip(loop.carried, carried, strict=True)}}
+            self.compute(in_order(loop.results), inside, load)
+            return [self.operand(r, inside) for r in loop.results]
+
+        types = [self.vector(TYPES[c.dtype.kind]) for c in loop.carried]
+        start = [self.operand(s, registers) for s in loop.start]
+        return self.repeat(f"{{}}{self._loops}", loop.rounds, types, start, body)
+
+    def repeat(
+        self,
+        names: str,
+        rounds: int,
+        types: Sequence[str],
+        start: Sequence[str],
+        body: Callable[[list[str]], list[str]],
+    ) -> list[str]:
+        """Write a loop; `body` writes a round, from the registers of what is carried to those of what is carried on.
+
+        The names of blocks have {} for what each is. Returned are the registers of what the last round carries on.
+        """
+        before, again, after = self.block, names.format("again"), names.format("after")
         self.write(f"br label %{again}")
         self.label(again)
         head = len(self.lines)
-        carried, rounds = [self.register() for _ in loop.carried], self.register()
-        inside = {**registers, **{id(c): register for c, register in zip(loop.carried, carried, strict=True)}}
-        self.compute(in_order(loop.results), inside, load)
-        results = [self.operand(r, inside) for r in loop.results]
-        following = self.put(f"add i32 {rounds}, 1")
-        more = self.put(f"icmp ult i32 {following}, {loop.rounds}")
+        carried, number = [self.register() for _ in types], self.register()
+        results = body(carried)
+        following = self.put(f"add i32 {number}, 1")
         self.lines[head:head] = [
-            either(register, self.vector(TYPES[c.dtype.kind]), (first, before), (result, self.block))
-            for register, c, first, result in zip(carried, loop.carried, start, results, strict=True)
-        ] + [either(rounds, "i32", ("0", before), (following, self.block))]
+            either(register, type_, (first, before), (result, self.block))
+            for register, type_, first, result in zip(
+                [*carried, number], [*types, "i32"], [*start, "0"], [*results, following], strict=True
+            )
+        ]
+        more = self.put(f"icmp ult i32 {following}, {rounds}")
         self.write(f"br i1 {more}, label %{again}, label %{after}")
         self.label(after)
         return results
@@ -334,24 +359,31 @@ class Instructions:
     def _choose(self, choice: Choice, registers: dict[int, Any], load: Loader) -> list[str]:
         """Write both ways of a choice; return the results' registers."""
         self._branches += 1
-        whole, short, end = (f"{name}{self._branches}" for name in ("whole", "short", "end"))
+
+        def way(numbers: Sequence[Number]) -> list[str]:
+            inside = dict(registers)
+            self.compute(in_order(numbers), inside, load)
+            return [self.operand(n, inside) for n in numbers]
+
         condition = self.in_any_lane(self.operand(choice.condition, registers))
+        types = [self.vector(TYPES[n.dtype.kind]) for n in choice.whole]
+        return self.choose(f"{{}}{self._branches}", choice, condition, types, way)
+
+    def choose(
+        self, names: str, choice: Choice, condition: str, types: Sequence[str], way: Callable[..., list[str]]
+    ) -> list[str]:
+        """Write both ways of a choice, each by `way`, from numbers to registers; for `names` see `repeat`."""
+        whole, short, end = map(names.format, ("whole", "short", "end"))
         self.declared[WEIGHTS] = None
         self.write(f"br i1 {condition}, label %{whole}, label %{short}, !prof !0")
         ways = []
         for name, numbers in ((whole, choice.whole), (short, choice.short)):
             self.label(name)
-            inside = dict(registers)
-            self.compute(in_order(numbers), inside, load)
-            ways.append(([self.operand(n, inside) for n in numbers], self.block))
+            ways.append([(value, self.block) for value in way(numbers)])
             self.write(f"br label %{end}")
         self.label(end)
-        (all_values, all_from), (few_values, few_from) = ways
-        results = [self.register() for _ in choice.whole]
-        self.lines += [
-            either(register, self.vector(TYPES[n.dtype.kind]), (a, all_from), (b, few_from))
-            for register, n, a, b in zip(results, choice.whole, all_values, few_values, strict=True)
-        ]
+        results = [self.register() for _ in types]
+        self.lines += [either(*one) for one in zip(results, types, *ways, strict=True)]
         return results
 
     def in_any_lane(self, condition: str) -> str:

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from evoclaims.kernels.emit.gpu_instructions import GpuInstructions
 from evoclaims.kernels.emit.gpu_kernel import BLOCK, Element, finished, parameters
-from evoclaims.kernels.emit.llvm_ir import TYPES, WEIGHTS, ArrayRow, either, literal
+from evoclaims.kernels.emit.llvm_ir import TYPES, ArrayRow, literal
 from evoclaims.kernels.emit.parts import Parts, Product, Term, Total, term
 from evoclaims.kernels.trace.expressions import (
     Expression,
@@ -241,28 +241,20 @@ class _Writer:
 
     def repeat(self, around: Loop) -> None:
         """Write a loop."""
-        page, layout = self._page, self._layout(around)
+        layout = self._layout(around)
+        units = [unit for unit, _ in layout]
+        types = [TYPES[around.carried[places[0]].dtype.kind] for _, places in layout]
         start = self._carry(layout, around.start)
         self.need(around.taken)
         self._loops += 1
-        name = f"loop{self._loops}"
-        before = page.block
-        page.write(f"br label %{name}.again")
-        page.label(f"{name}.again")
-        head, outside = len(page.lines), dict(self._registers)
-        carried, number = [page.register() for _ in layout], page.register()
-        types = [TYPES[around.carried[places[0]].dtype.kind] for _, places in layout]
-        self._registers.update(zip((unit for unit, _ in layout), carried, strict=True))
-        results = self._round(around, layout, types, name)
-        more = page.put(f"add i32 {number}, 1")
-        page.lines[head:head] = [
-            either(register, type_, (first, before), (result, page.block))
-            for register, type_, first, result in zip(carried, types, start, results, strict=True)
-        ] + [either(number, "i32", ("0", before), (more, page.block))]
-        again = page.put(f"icmp ult i32 {more}, {around.rounds}")
-        page.write(f"br i1 {again}, label %{name}.again, label %{name}.after")
-        page.label(f"{name}.after")
-        self._registers = outside | dict(zip((unit for unit, _ in layout), results, strict=True))
+        outside, name = self._registers, f"loop{self._loops}"
+
+        def body(carried: Sequence[str]) -> list[str]:
+            self._registers = outside | dict(zip(units, carried, strict=True))
+            return self._round(around, layout, types, name)
+
+        results = self._page.repeat(f"{name}.{{}}", around.rounds, types, start, body)
+        self._registers = outside | dict(zip(units, results, strict=True))
 
     def _round(self, around: Loop, layout: Layout, types: Sequence[str], name: str) -> list[str]:
         """Write a round; return what it carries on. All threads of a warp take the same way."""
@@ -272,25 +264,16 @@ class _Writer:
         self.need([choice.condition, *choice.taken])
         condition = self._value([term(choice.condition)])
         anywhere = page.call("llvm.nvvm.vote.any.sync", "i1", [EVERYONE, ("i1", condition)])
-        page.declared[WEIGHTS] = None
-        page.write(f"br i1 {anywhere}, label %{name}.whole, label %{name}.short, !prof !0")
-        made = []
         before = self._registers
-        for way, numbers in (("whole", choice.whole), ("short", choice.short)):
+
+        def way(numbers: Sequence[Number]) -> list[str]:
             self._registers = dict(before)
-            page.label(f"{name}.{way}")
             self._element.forget()
-            made.append((self._carry(layout, numbers), page.block))
-            page.write(f"br label %{name}.end")
+            return self._carry(layout, numbers)
+
+        results = page.choose(f"{name}.{{}}", choice, anywhere, types, way)
         self._registers = before
-        page.label(f"{name}.end")
         self._element.forget()
-        (long, long_from), (short, short_from) = made
-        results = [page.register() for _ in layout]
-        page.lines += [
-            either(register, type_, (a, long_from), (b, short_from))
-            for register, type_, a, b in zip(results, types, long, short, strict=True)
-        ]
         return results
 
     def store(self, results: Sequence[Numbers], inside: str) -> None:
