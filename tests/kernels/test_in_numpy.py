@@ -20,7 +20,6 @@ MORE: dict[str, Callable[[Any], Any]] = {
     "powers": lambda x: (jax.lax.rsqrt(x * x), jnp.power(jnp.abs(x), x), jnp.exp(x), jnp.log(x * x), jnp.square(x)),
     "rows": lambda x: (jnp.tile(x, 2), jax.lax.pad(x, 0.5, [(1, 2, 1)]), jax.lax.cumsum(x, reverse=True)),
     "integer quotients": lambda x: (jnp.int32(x * 9) // 4, jax.lax.div(jnp.int32(x * 9), jnp.int32(x * 3))),
-    "a matrix that has no Cholesky factor": lambda x: jnp.linalg.cholesky(jnp.diag(x)),
     "a loop over rows": lambda x: jax.lax.scan(lambda c, row: (c + row, c * row), x[0], x[1:], reverse=True),
     "a loop of unknown length": lambda x: jax.lax.while_loop(lambda c: c < 9.0, lambda c: c + jnp.abs(x[0]) + 1, x[1]),
     "a window at a place of its own": lambda x: jax.lax.dynamic_slice(x, (jnp.argmax(x),), (2,)),

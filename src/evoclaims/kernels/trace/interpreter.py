@@ -80,6 +80,10 @@ class Scalars:
         """Start without expressions; for `mirrors` see `Algebra`."""
         self.algebra = Algebra(mirrors)
 
+    def check(self, dtype: Any) -> np.dtype[Any]:
+        """Check a dtype that numbers have; see `check`."""
+        return check(dtype)
+
     def run(self, closed: Any, operands: Sequence[Numbers]) -> list[Numbers]:
         """Return the results of a closed jaxpr."""
         jaxpr = closed.jaxpr
@@ -100,7 +104,7 @@ class Scalars:
             results = self._apply(equation, [read(v) for v in equation.invars])
             for variable, result in zip(equation.outvars, results, strict=True):
                 if not all(map(ex.is_known, result.flat)):
-                    check(variable.aval.dtype)
+                    self.check(variable.aval.dtype)
             values.update(zip(equation.outvars, results, strict=True))
         return [read(v) for v in jaxpr.outvars]
 
@@ -109,7 +113,7 @@ class Scalars:
         name = equation.primitive.name
         if name in ELEMENTARY:
             for variable in equation.invars:
-                check(variable.aval.dtype)
+                self.check(variable.aval.dtype)
             return [self.each(lambda *numbers: ELEMENTARY[name](self.algebra, *numbers), *operands)]
         if name in ex.KNOWN:
             return [self.elementwise(name, *operands)]
