@@ -12,7 +12,6 @@ from evoclaims.kernels.trace.expressions import (
     COMPARISONS,
     FUSED,
     KNOWN,
-    Expression,
     Number,
     ScalarOperation,
     Unsupported,
@@ -167,30 +166,25 @@ def _check_divisor(divisor: Number) -> None:
         raise Unsupported("a division by an integer that may be 0")
 
 
-def _neg(algebra: Algebra, a: Number) -> Number | None:
-    return a.operands[0] if isinstance(a, ScalarOperation) and a.name == "neg" else None
+def _undone(name: str) -> Rule:
+    """Return the rule of an operation that undoes itself."""
+    return lambda algebra, a: a.operands[0] if isinstance(a, ScalarOperation) and a.name == name else None
 
 
 def _same(algebra: Algebra, a: Number, b: Number) -> Number | None:
     return a if a is b else None
 
 
-def _and(algebra: Algebra, a: Number, b: Number) -> Number | None:
-    if a.dtype == bool and (is_known(a) or is_known(b)):
-        known, other = (a, b) if is_known(a) else (b, a)
-        return other if known else known
-    return _same(algebra, a, b)
+def _decided(by: bool) -> Rule:
+    """Return the rule of "and" or "or": a condition that is known decides, or leaves it to the other one."""
 
+    def rule(algebra: Algebra, a: Number, b: Number) -> Number | None:
+        if a.dtype == bool and (is_known(a) or is_known(b)):
+            known, other = (a, b) if is_known(a) else (b, a)
+            return known if bool(known) is by else other
+        return _same(algebra, a, b)
 
-def _or(algebra: Algebra, a: Number, b: Number) -> Number | None:
-    if a.dtype == bool and (is_known(a) or is_known(b)):
-        known, other = (a, b) if is_known(a) else (b, a)
-        return known if known else other
-    return _same(algebra, a, b)
-
-
-def _not(algebra: Algebra, a: Expression) -> Number | None:
-    return a.operands[0] if isinstance(a, ScalarOperation) and a.name == "not" else None
+    return rule
 
 
 def _shift(algebra: Algebra, a: Number, places: Number) -> Number | None:
@@ -267,14 +261,14 @@ SIGNED: Final[dict[str, Rule]] = {
 """How signs move outwards. Operands keep their order, by which products are fused with sums."""
 RULES: Final[dict[str, Rule]] = {
     "add": _add,
-    "and": _and,
+    "and": _decided(by=False),
     "div": _div,
     "max": _same,
     "min": _same,
     "mul": _mul,
-    "neg": _neg,
-    "not": _not,
-    "or": _or,
+    "neg": _undone("neg"),
+    "not": _undone("not"),
+    "or": _decided(by=True),
     "rem": _rem,
     "select": _select,
     "shift_left": _shift,
