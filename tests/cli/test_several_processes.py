@@ -18,6 +18,7 @@ from tiny_project import REPRODUCTION, Evoclaims, Project
 
 from evoclaims.core.errors import UserError
 from evoclaims.envs.gates.parity import NParity
+from evoclaims.execution import host as gpus
 from evoclaims.execution import workers
 from evoclaims.execution.host import AUTO, Host, host_of
 from evoclaims.execution.job import Job, MissingBatch
@@ -25,7 +26,6 @@ from evoclaims.execution.worker import Ended, WorkOrder
 from evoclaims.execution.workers import ATTEMPTS, Seat, Workers, in_queue, seats_of, useful_processes
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.paper.cost import Cost
-from evoclaims.trials import gpus
 from evoclaims.trials.integrity import verify
 from evoclaims.trials.layout import Layout
 from evoclaims.trials.spec import Budget, Condition
@@ -305,7 +305,8 @@ LOOKS = """
 import sys
 import time
 from jax._src import xla_bridge
-from evoclaims.trials import devices, gpus
+from evoclaims.execution import host as gpus
+from evoclaims.trials import devices
 
 def keep_off_gpus():
     print("looked before" if xla_bridge.backends_are_initialized() else "has not looked")

@@ -91,7 +91,7 @@ def test_trials_for_the_drift_check_are_counted_where_they_are_made(
         seen.append(Watching(load, workers).look().trials)
         raise UserError("no more is needed")
 
-    monkeypatch.setattr("evoclaims.trials.gpus.gpus", lambda device: gpus)
+    monkeypatch.setattr("evoclaims.execution.host.gpus", lambda device: gpus)
     monkeypatch.setattr("evoclaims.trials.devices.keep_off_gpus", lambda: None)
     monkeypatch.setattr(Ahead, "_run", lambda ahead, runs: None)
     monkeypatch.setattr(ProgressLine, "begin", begin)

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoclaims.trials import gpus
+from evoclaims.execution import host as gpus
 
 
 @pytest.fixture

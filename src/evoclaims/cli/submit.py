@@ -30,11 +30,11 @@ from evoclaims.cluster.submissions import (
 )
 from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UserError
+from evoclaims.execution.host import gpus
 from evoclaims.execution.job import Job, MissingBatch, missing_batches
 from evoclaims.report.formatting import plural
 from evoclaims.report.live_line import duration
 from evoclaims.trials.devices import usable_cores
-from evoclaims.trials.gpus import gpus
 from evoclaims.trials.lease import announced
 from evoclaims.trials.spec import Condition
 

@@ -20,6 +20,7 @@ import pytest
 
 from evoclaims.core.errors import UserError
 from evoclaims.core.tiers import TIERS
+from evoclaims.execution.host import gpus, host_of
 from evoclaims.plugin import options
 from evoclaims.plugin.options import AHEAD, import_from_root, make_session
 from evoclaims.plugin.options import pytest_addoption as pytest_addoption
@@ -31,7 +32,6 @@ from evoclaims.plugin.outcomes import pytest_runtest_setup as pytest_runtest_set
 from evoclaims.plugin.progress import QUIET, ProgressLine, progress_of
 from evoclaims.plugin.start import prepare
 from evoclaims.plugin.summary import COLLECTED, KNOWN, TROUBLE, Summary
-from evoclaims.trials.gpus import gpus
 from evoclaims.trials.stopping import end_without, interrupted_by, only_told
 
 if TYPE_CHECKING:
@@ -138,8 +138,6 @@ def pytest_load_initial_conftests(early_config: pytest.Config) -> None:
     known = early_config.known_args_namespace
     # Other projects that have evoclaims installed are left alone.
     if known.claims_processes != "1" and gpus(known.claims_device) and options.settings_of(early_config):
-        from evoclaims.execution.host import host_of
-
         with suppress(UserError):  # `options.check` reports it
             host_of(known.claims_processes, known.claims_device)
 

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Final
 import pytest
 
 from evoclaims.core.errors import UserError
+from evoclaims.execution.host import gpus
 from evoclaims.plugin.options import AHEAD, make_session
 from evoclaims.plugin.progress import progress_of
-from evoclaims.trials.gpus import gpus
 
 if TYPE_CHECKING:
     from evoclaims.claims.claim import ClaimTest
