@@ -9,11 +9,10 @@ from dataclasses import dataclass, replace
 
 from evoclaims.core.canonical import content_hash
 from evoclaims.judging.assertion import Assertion, Finding
-from evoclaims.judging.copies import Copies, copies
 from evoclaims.judging.design import Design, Look
 from evoclaims.judging.exact import MAX_TRIALS
 from evoclaims.judging.sample import Source, Trials, UnreadableTrialError
-from evoclaims.judging.spending import overspent
+from evoclaims.judging.scrutiny import Copies, copies, overspent
 from evoclaims.judging.verdict import Direction, Outcome, PValues, Verdict
 from evoclaims.trials.failed import place, why
 from evoclaims.trials.result import TrialResult
