@@ -27,13 +27,14 @@ ELEMENTARY: Final[dict[str, Callable[..., Any]]] = {
     "atan2": np.arctan2,
     "is_finite": np.isfinite,
     "logistic": lambda x: 1 / (1 + np.exp(-x)),
-    "rem": np.fmod,
     "rsqrt": lambda x: 1 / np.sqrt(x),
     "seldom": np.asarray,
     "tan": np.tan,
     "tanh": np.tanh,
 }
 """Operations that kernels make of simpler ones, or have not, by jax's names."""
+NARROW: Final = "shift_right_logical"
+"""What expressions know of 32 bits alone."""
 
 
 def in_numpy(function: Callable[..., Any], *inputs: NDArray[Any]) -> list[NDArray[Any]]:
@@ -79,7 +80,7 @@ class _Computing(Algebra):
         return super().apply(name, *operands)
 
     def _shared(self, name: str, operands: tuple[Number, ...], dtype: np.dtype[Any]) -> Any:
-        if name == "cast" and dtype.kind == "i" and operands[0].dtype.kind == "f":
+        if name == "cast" and dtype.kind in "iu" and operands[0].dtype.kind == "f":
             raise Unsupported("floats that become integers")  # which NumPy does not limit as XLA does
         if name == "cast":
             return _Lanes(dtype, operands[0].values.astype(dtype))
@@ -112,6 +113,8 @@ class _Evaluated(Scalars):
     def _apply(self, equation: Any, operands: list[Numbers]) -> Sequence[Numbers]:
         name = equation.primitive.name
         try:
+            if name == NARROW:
+                return self._compiled(equation, operands)
             if name == "scan":
                 return self._repeated(equation, operands)
             if name in ELEMENTARY:
