@@ -101,6 +101,28 @@ class Own(gymnasium.Env[Any, Any]):
     pass
 
 
+class Tenths(gymnasium.Env[Any, Any]):
+    """Pays 0.1 a step, whatever is done."""
+
+    observation_space = gymnasium.spaces.Box(-1.0, 1.0, (1,))
+    action_space = gymnasium.spaces.Discrete(2)
+
+    def reset(self, **_: Any) -> Any:
+        return np.zeros(1, np.float32), {}
+
+    def step(self, action: Any) -> Any:
+        return np.zeros(1, np.float32), 0.1, False, False, {}
+
+
+def test_a_return_is_the_sum_without_errors_on_the_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    maker: Any = Tenths
+    spec = gymnasium.envs.registration.EnvSpec("Tenths-v0", entry_point=maker)
+    monkeypatch.setitem(gymnasium.registry, "Tenths-v0", spec)
+    task = GymnasiumTask("Tenths-v0", solved_at=0.8, episode_steps=8, examined_episodes=1)
+    assert sum([0.1] * 8) < 0.8
+    assert task.examine_natively(lambda observation: 0, 0)[:2] == (0.8, 1.0)
+
+
 @pytest.mark.parametrize("maker", [Own, f"{__name__}:Own"])
 def test_the_class_of_a_user_s_own_environment_is_looked_at(maker: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     spec = gymnasium.envs.registration.EnvSpec("Own-v0", entry_point=maker)
