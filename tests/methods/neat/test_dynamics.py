@@ -10,6 +10,7 @@ import pytest
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.neat.evolution import Evolution, Neat
 from evoclaims.methods.neat.settings import Mutation, Settings, Species
+from evoclaims.trials.layout import FAST_TO_COMPILE
 
 pytestmark = pytest.mark.slow
 
@@ -41,7 +42,8 @@ def test_genomes_have_as_many_nodes_after_120_generations_as_tensorneats() -> No
         state, success = jax.lax.scan(generation, state, jax.random.split(train, GENERATIONS))
         return jnp.mean(state.population.genomes.node_count.astype(jnp.float32)), success
 
-    nodes, success = jax.jit(lambda keys: jax.lax.map(trial, keys))(jax.random.split(jax.random.key(0), SEEDS))
+    trials = jax.jit(lambda keys: jax.lax.map(trial, keys), compiler_options=FAST_TO_COMPILE)  # it runs for long
+    nodes, success = trials(jax.random.split(jax.random.key(0), SEEDS))
     assert 10.5 < float(np.mean(nodes)) < 14.5, np.asarray(nodes)
     best = np.asarray(success) * 64
     assert (best[:, 0] <= 42).all()
