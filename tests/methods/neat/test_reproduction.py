@@ -35,11 +35,11 @@ def _species(
     rest = [0] * (most - count)
     return SpeciesState(
         centres=stacked([made([place], {}, capacity=(1, 1)) for place in range(most)]),
-        count=jnp.asarray(count, jnp.int32),
-        best=jnp.array([*(best or [0.0] * count), *rest], jnp.float32),
-        improved_at=jnp.array([*(improved_at or [GENERATION] * count), *rest], jnp.int32),
-        size=jnp.array(np.bincount(member_of, minlength=most), jnp.int32),
-        member_of=jnp.array(member_of, jnp.int32),
+        count=np.int32(count),
+        best=np.array([*(best or [0.0] * count), *rest], np.float32),
+        improved_at=np.array([*(improved_at or [GENERATION] * count), *rest], np.int32),
+        size=np.bincount(member_of, minlength=most).astype(np.int32),
+        member_of=np.array(member_of, np.int32),
     )
 
 
@@ -60,15 +60,15 @@ def situations(draw: st.DrawFn) -> tuple[list[int], list[float], list[float], li
 def test_species_survive_and_are_sorted_as_in_the_reference(situation: Any) -> None:
     member_of, fitness, best, improved_at = situation
     before = _species(member_of, best, improved_at)
-    after = _survive(before, jnp.array(fitness, jnp.float32))
+    after = jax.device_get(_survive(before, np.array(fitness, np.float32)))
     known = records(before, int(before.count))
     wanted = reference.survive(known, fitness, GENERATION, SETTINGS.stagnation, SETTINGS.exempt)
     count = int(after.count)
     assert count == len(wanted) >= 1
-    assert np.asarray(after.centres.nodes.key)[:count, 0].tolist() == list(wanted)
-    assert np.asarray(after.best)[:count].tolist() == [record.best for record in wanted.values()]
-    assert np.asarray(after.improved_at)[:count].tolist() == [record.improved_at for record in wanted.values()]
-    assert np.asarray(after.size).tolist() == [len(r.members) for r in wanted.values()] + [0] * (MOST - count)
+    assert after.centres.nodes.key[:count, 0].tolist() == list(wanted)
+    assert after.best[:count].tolist() == [record.best for record in wanted.values()]
+    assert after.improved_at[:count].tolist() == [record.improved_at for record in wanted.values()]
+    assert after.size.tolist() == [len(r.members) for r in wanted.values()] + [0] * (MOST - count)
     assert {i: r.members for i, r in records(after, MOST).items() if i < count} == {
         i: record.members for i, record in enumerate(wanted.values())
     }
@@ -126,7 +126,7 @@ def test_children_of_200_generations_stand_where_the_reference_puts_them(history
 def test_parents_are_the_best_of_their_childs_species(situation: Any, seed: int) -> None:
     member_of, fitness, _, _ = situation
     species = _species(member_of)
-    parents = jax.device_get(_parents(jax.random.key(seed), species, jnp.array(fitness, jnp.float32)))
+    parents = jax.device_get(_parents(jax.random.key(seed), species, np.array(fitness, np.float32)))
     known, child = list(records(species, int(species.count)).values()), 0
     counts = reference.offspring([len(record.members) for record in known], POPULATION)
     for record, count in zip(known, counts, strict=True):
@@ -162,6 +162,7 @@ def test_at_least_one_member_and_at_most_all_are_parents(survival: float) -> Non
     species, fitness = _species([0] * POPULATION), jnp.arange(float(POPULATION))
     chosen = Species(most=MOST, survival=survival)
     keys = jax.random.split(jax.random.key(1), 40)
-    parents = jax.jit(jax.vmap(lambda key: choose_parents(key, chosen, species, fitness)))(keys)
+    drawn = jax.vmap(lambda key, *given: choose_parents(key, chosen, *given), (0, None, None))
+    parents = jax.jit(drawn)(keys, species, fitness)
     children = np.concatenate([np.asarray(parents.fitter)[:, 2:], np.asarray(parents.other)[:, 2:]])
     assert set(children.ravel().tolist()) == set(reference.pool(range(POPULATION), range(POPULATION), survival))
