@@ -103,6 +103,19 @@ def test_limits_and_growing_arrays_are_no_part_of_the_result(resetting: Bench, k
     assert same(resetting.reports, keeping.reports)
 
 
+def test_trials_side_by_side_work_in_the_smallest_arrays_that_fit_all(keeping: Bench) -> None:
+    """A kernel of smaller arrays, if it ran for all and its results were not used, would write behind them."""
+    sizes = [(7, 12), (32, 128)]
+
+    def used(*genomes: Any) -> Any:
+        return capacity.in_capacity(sizes, genomes, lambda nodes, _: jnp.int32(nodes))
+
+    for places, wanted in (((0, 1), 7), ((0, -1), 32), ((-1, -1), 32)):
+        some = [keeping.states[place].population.genomes for place in places]
+        nested = jax.tree.map(lambda *leaf: np.stack(leaf)[:, None], *some)
+        assert np.unique(jax.vmap(jax.vmap(used))(nested)).tolist() == [wanted]
+
+
 def test_the_champion_is_the_best_of_its_generation_and_of_equals_the_newest(resetting: Bench) -> None:
     rows, ties = TASK.table.inputs[:4].astype(np.float64), 0
     for before, after, progress in zip(resetting.states, resetting.states[1:], resetting.reports, strict=False):

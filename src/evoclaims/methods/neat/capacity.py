@@ -8,6 +8,7 @@ from typing import Any, Final
 
 import jax
 import jax.numpy as jnp
+from jax.custom_batching import custom_vmap
 from jaxtyping import Array, Int
 
 from evoclaims.methods.neat.settings import Settings
@@ -48,6 +49,18 @@ def in_capacity(
 ) -> Any:
     """Call `function(nodes, connections, *operands)` with the smallest of the `sizes` that fits the genomes' children.
 
-    The result must not depend on the capacity.
+    The result must not depend on the capacity. Under `vmap`, all work in the smallest that fits all.
     """
-    return jax.lax.switch(fitting(sizes, genomes), [partial(function, *size) for size in sizes], *operands)
+    place = _largest(fitting(sizes, genomes))
+    return jax.lax.switch(place, [partial(function, *size) for size in sizes], *operands)
+
+
+@custom_vmap
+def _largest(place: Int[Array, ""]) -> Int[Array, ""]:
+    """Return a place; under `vmap` the largest: if all sizes were computed, kernels would write behind small arrays."""
+    return place
+
+
+@_largest.def_vmap
+def _(size: int, batched: Sequence[bool], places: Int[Array, " trials"]) -> tuple[Int[Array, ""], bool]:
+    return _largest(jnp.max(places)), False
