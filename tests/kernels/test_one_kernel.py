@@ -20,6 +20,7 @@ from evoclaims.kernels.call.kernel import Kernel, one_kernel
 from evoclaims.kernels.emit import block_kernel, gpu_kernel, machine_code
 from evoclaims.kernels.trace.algebra import Algebra
 from evoclaims.kernels.trace.elementary import WIDEST
+from evoclaims.kernels.trace.expressions import Input
 
 
 @pytest.mark.parametrize("case", FUNCTIONS)
@@ -97,6 +98,19 @@ def test_a_batch_of_nothing_is_nothing() -> None:
 def test_an_angle_is_right_at_corners(corner: tuple[float, float]) -> None:
     y, x = (jnp.full((1,), c, jnp.float32) for c in corner)
     np.testing.assert_allclose(jax.vmap(one_kernel(jnp.arctan2, "This"))(y, x), np.arctan2(*corner), atol=3e-7)
+
+
+def test_operations_are_one_object_exactly_if_they_are_equal() -> None:
+    """Those whose operands may change places are, in either order; of known numbers the bits count."""
+    algebra, (a, b) = Algebra(), (Input(np.dtype(np.float32), 0, at) for at in range(2))
+    made = [(name, *pair) for name in ("add", "sub", "lt", "max") for pair in ((a, b), (b, a), (a, np.float32(2)))]
+    made += [("max", a, np.float32(0.0)), ("max", a, np.float32(-0.0))]
+    alike = {}
+    for name, one, other in made:
+        key = frozenset((repr(one), repr(other))) if name in ("add", "max") else (repr(one), repr(other))
+        alike.setdefault((name, key), set()).add(id(algebra.apply(name, one, other)))
+    assert {len(objects) for objects in alike.values()} == {1}
+    assert len(set().union(*alike.values())) == len(alike)
 
 
 def test_any_argument_may_be_shared_by_a_batch_of_batches() -> None:

@@ -116,9 +116,10 @@ def loop(rounds: int, carried: Sequence[Carried], start: Sequence[Number], resul
     inside: set[int] = {id(c) for c in carried}
     taken: dict[int, Expression] = {}
     for expression in in_order(results, with_ways):
-        if any(id(p) in inside for p in with_ways(expression)):
+        read = with_ways(expression)
+        if any(id(p) in inside for p in read):
             inside.add(id(expression))
-            taken.update((id(p), p) for p in with_ways(expression) if id(p) not in inside)
+            taken.update((id(p), p) for p in read if id(p) not in inside)
     taken.update((id(r), r) for r in results if not is_known(r) and id(r) not in inside)
     return Loop(rounds, tuple(carried), tuple(start), tuple(results), tuple(taken.values()))
 

@@ -48,6 +48,8 @@ def with_shortcut(results: Sequence[Number], mirrors: bool = False) -> list[Numb
     """
     order = in_order(results)
     guards = [e for e in order if isinstance(e, ScalarOperation) and e.name == "seldom"]
+    if not guards:
+        return list(results)
     algebra = Algebra(mirrors)
     new: dict[int, Number] = {id(guard): np.bool_(False) for guard in guards}
     for expression in order:
@@ -56,8 +58,6 @@ def with_shortcut(results: Sequence[Number], mirrors: bool = False) -> list[Numb
                 return list(results)
             operands = [new.get(id(o), o) for o in expression.operands]
             new[id(expression)] = algebra.again(expression, operands)
-    if not guards:
-        return list(results)
     # Where all guards are False, each is also without what earlier ones switch on. Where some are not, the first is.
     conditions = [new.get(id(guard.operands[0]), guard.operands[0]) for guard in guards]
     condition: Number = reduce(partial(algebra.apply, "or"), conditions)
@@ -145,6 +145,7 @@ def _products(results: Sequence[Number]) -> frozenset[int]:
     return frozenset(chosen)
 
 
+@np.errstate(all="ignore")
 def scalarize(traced: ClosedJaxpr, mirrors: bool = False) -> list[Numbers]:
     """Return the expressions of every result of a traced function.
 
