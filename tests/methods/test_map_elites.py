@@ -36,14 +36,14 @@ WIDTH, HEIGHT = (X_MAX - X_MIN) / X, (Y_MAX - Y_MIN) / Y
 
 def _episodes(rows: list[tuple[float, float, float]]) -> Episode:
     """Return episodes with the given fitness, x and y, and with their number as success."""
-    fitness, x, y = jnp.asarray(np.array(rows, np.float32).T)
-    return Episode(fitness=fitness, success=jnp.arange(len(rows), dtype=jnp.float32), metrics={"x": x, "y": y})
+    fitness, x, y = np.array(rows, np.float32).T
+    return Episode(fitness=fitness, success=np.arange(len(rows), dtype=np.float32), metrics={"x": x, "y": y})
 
 
 def _population(first: int) -> Any:
     """Return genotypes that are all different: their number, and 100 times that, and so on."""
     size = SMALL.network.size(2, 2)
-    return (first + jnp.arange(8, dtype=jnp.float32))[:, None] * jnp.arange(1.0, size + 1)[None, :]
+    return (first + np.arange(8, dtype=np.float32))[:, None] * np.arange(1, size + 1, dtype=np.float32)[None, :]
 
 
 INSERT = jax.jit(lambda state, population, episodes: SMALL.insert(Plane(), state, population, episodes))
@@ -72,7 +72,8 @@ def test_the_archive_is_the_one_that_loops_keep(batches: list[list[tuple[float, 
                 continue
             cell = int((x - X_MIN) // WIDTH), int((y - Y_MIN) // HEIGHT)
             if cell not in mine or fitness > mine[cell][0]:
-                mine[cell] = fitness, x, y, individual, np.asarray(population[individual])
+                mine[cell] = fitness, x, y, individual, population[individual]
+    state = jax.device_get(state)
     archive, table = state.archive, np.asarray(SMALL.fitness_map(state))
     assert {tuple(map(int, cell)) for cell in np.argwhere(table > -np.inf)} == mine.keys()
     for (i, j), (fitness, x, y, individual, genotype) in mine.items():
