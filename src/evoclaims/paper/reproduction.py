@@ -147,6 +147,8 @@ class Tier:
 
     def condition(self, method: str, task: str) -> Condition:
         """Return the condition of a method on a task; an `UnknownNameError` lists the known ones, or tiers with it."""
+        if (method, task) in self.conditions:
+            return self.conditions[method, task]
         methods = {m for m, _ in self.conditions}
         if method not in methods:
             self._require_nowhere_else(f"method {method!r}", lambda names: names[0] == method)
@@ -253,8 +255,17 @@ class Reproduction:
     def tier(self, name: str, variant: str = "") -> Tier:
         """Return a tier, changed by a variant if one is named; an `UnknownNameError` lists the known ones."""
         changes = self.changed_by(variant, name)
-        tier = self.tiers[name]
-        return replace(tier, conditions={**tier.conditions, **changes}) if changes else tier
+        if not changes:
+            return self.tiers[name]
+        if (name, variant) not in self._changed_tiers:  # tables of all variants ask for them thousands of times
+            tier = self.tiers[name]
+            self._changed_tiers[name, variant] = replace(tier, conditions={**tier.conditions, **changes})
+        return self._changed_tiers[name, variant]
+
+    @cached_property
+    def _changed_tiers(self) -> dict[tuple[str, str], Tier]:
+        """The tiers that `tier` has made for variants, by both names."""
+        return {}
 
     @property
     def seeds_for_drift(self) -> dict[str, range]:
