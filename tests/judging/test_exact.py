@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import gc
 import math
-from collections.abc import Iterator
 from fractions import Fraction
 from itertools import combinations
 from math import comb
@@ -87,15 +85,6 @@ def test_a_null_without_uncertainty_and_an_unknown_alternative_are_rejected(p0: 
         binomial_test(1, 2, p0, alternative)
 
 
-@pytest.fixture(scope="module")
-def _little_garbage() -> Iterator[None]:
-    """Keep garbage collection, which statsmodels asks for at every call, from going through all programs of a run."""
-    gc.freeze()
-    yield
-    gc.unfreeze()
-
-
-@pytest.mark.usefixtures("_little_garbage")
 @given(st.lists(st.floats(0, 1), min_size=1, max_size=6))
 @settings(max_examples=30)
 def test_holm_steps_down_from_the_smallest_p(ps: list[float]) -> None:

@@ -6,6 +6,7 @@ integers adds and multiplies the polynomials (Kronecker's substitution); with Py
 
 from __future__ import annotations
 
+import gc
 import math
 from collections import Counter
 from collections.abc import Sequence
@@ -214,7 +215,10 @@ def smallest(ps: Sequence[float]) -> float:
 
 @lru_cache(maxsize=1024)
 def _holm(ps: tuple[float, ...]) -> tuple[float, ...]:
-    """Return the adjusted p; cached, since statsmodels runs the garbage collector in every call (tens of ms)."""
     from statsmodels.stats.multitest import multipletests  # takes a second: it imports pandas
 
-    return tuple(float(p) for p in multipletests(list(ps), method="holm")[1])
+    gc.freeze()  # statsmodels collects garbage in every call, for seconds where many programs have been traced
+    try:
+        return tuple(float(p) for p in multipletests(list(ps), method="holm")[1])
+    finally:
+        gc.unfreeze()

@@ -73,12 +73,6 @@ def _apart(array: NDArray[Any]) -> Numbers:
 class _Computing(Algebra):
     """Computes operations, where others make expressions."""
 
-    def apply(self, name: str, *operands: Number) -> Number:
-        """Return the result of an operation."""
-        if all(map(is_known, operands)):  # most are; nothing more is asked of them
-            return np.asarray(KNOWN[name](*operands))[()]
-        return super().apply(name, *operands)
-
     def _shared(self, name: str, operands: tuple[Number, ...], dtype: np.dtype[Any]) -> Any:
         if name == "cast" and dtype.kind in "iu" and operands[0].dtype.kind == "f":
             raise Unsupported("floats that become integers")  # which NumPy does not limit as XLA does
