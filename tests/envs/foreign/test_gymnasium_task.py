@@ -119,7 +119,6 @@ def test_a_return_is_the_sum_without_errors_on_the_way(monkeypatch: pytest.Monke
     spec = gymnasium.envs.registration.EnvSpec("Tenths-v0", entry_point=maker)
     monkeypatch.setitem(gymnasium.registry, "Tenths-v0", spec)
     task = GymnasiumTask("Tenths-v0", solved_at=0.8, episode_steps=8, examined_episodes=1)
-    assert sum([0.1] * 8) < 0.8
     assert task.examine_natively(lambda observation: 0, 0)[:2] == (0.8, 1.0)
 
 

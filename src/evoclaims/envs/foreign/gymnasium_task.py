@@ -119,7 +119,7 @@ class GymnasiumTask(ForeignTask):
                     observation, reward, terminated, truncated, _ = environment.step(action)
                     rewards.append(float(reward))
                     ended = terminated or truncated
-                total = sum(rewards)  # of eight times 0.1 less than 0.8
+                total = sum(rewards)  # of eight times 0.1 less than 0.8, before Python 3.12
                 return math.fsum(rewards) if math.isfinite(total) else total, len(rewards)
 
             return self.scores(map(played, seeds))
