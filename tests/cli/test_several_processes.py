@@ -142,7 +142,7 @@ def run(monkeypatch: pytest.MonkeyPatch) -> Run:
 
 
 def _gpu(name: str) -> Seat:
-    return Seat(gpus.only([name]))
+    return Seat(gpus.seeing_only([name]))
 
 
 def test_a_process_that_dies_gives_back_what_it_has_not_run(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
@@ -204,7 +204,7 @@ def test_an_interrupt_before_a_thread_has_started_ends_all(run: Run, monkeypatch
 
 
 def test_a_condition_on_several_gpus_leaves_them_to_others_when_it_has_ended(run: Run) -> None:
-    wide = Seat(gpus.only(["0", "1"]), Job("", "wide", "parity"), (_gpu("0"), _gpu("1")))
+    wide = Seat(gpus.seeing_only(["0", "1"]), Job("", "wide", "parity"), (_gpu("0"), _gpu("1")))
     ended, log = run(
         [["wide"], *([str(number)] for number in range(8))], [wide, _gpu("2")], took=lambda: time.sleep(0.02)
     )
@@ -215,7 +215,7 @@ def test_a_condition_on_several_gpus_leaves_them_to_others_when_it_has_ended(run
 
 
 def test_a_condition_that_dies_on_several_gpus_is_begun_again_on_one(run: Run) -> None:
-    wide = Seat(gpus.only(["0", "1"]), Job("", "wide", "parity"), (_gpu("0"), _gpu("1")))
+    wide = Seat(gpus.seeing_only(["0", "1"]), Job("", "wide", "parity"), (_gpu("0"), _gpu("1")))
     ended, log = run([["wide"]], [wide], deadly=Counter(wide=1))
     assert [(one.job.method, one.error) for one in ended] == [("wide", "")]
     (first, _), (second, _) = log

@@ -54,7 +54,8 @@ def test_a_jax_without_cuda_has_no_gpu(monkeypatch: pytest.MonkeyPatch) -> None:
 @given(st.integers(1, 9), st.integers(1, 20))
 def test_processes_have_gpus_of_their_own_or_share_one_and_its_memory(count: int, processes: int) -> None:
     found = [f"GPU-{number}" for number in range(count)]
-    seen = [(one[gpus.VISIBLE].split(","), float(one.get(gpus.MEMORY, 0.75))) for one in gpus.shared(found, processes)]
+    environments = gpus.sharing_gpus(found, processes)
+    seen = [(one[gpus.VISIBLE].split(","), float(one.get(gpus.MEMORY, 0.75))) for one in environments]
     assert len(seen) == processes
     used = Counter(gpu for names, _ in seen for gpu in names)
     assert used.keys() == set(found[: max(processes, count)])
@@ -68,7 +69,7 @@ def test_processes_have_gpus_of_their_own_or_share_one_and_its_memory(count: int
 @pytest.mark.usefixtures("host")
 def test_a_share_of_memory_that_a_user_has_set_stays(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(gpus.MEMORY, "0.2")
-    assert gpus.shared(["0"], 2) == [{gpus.VISIBLE: "0"}] * 2
+    assert gpus.sharing_gpus(["0"], 2) == [{gpus.VISIBLE: "0"}] * 2
 
 
 def test_mps_runs_where_its_process_lives_for_this_user(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from evoclaims.claims.fetching import more_for_drift
 from evoclaims.claims.workload import Workload, soonest_first
 from evoclaims.core.errors import UserError
-from evoclaims.execution.host import Host, only
+from evoclaims.execution.host import Host, seeing_only
 from evoclaims.execution.job import Job, MissingBatch
 from evoclaims.execution.worker import Ended, WorkOrder
 from evoclaims.execution.workers import Seat, StoppedError, Workers, in_queue, seats_of
@@ -199,7 +199,7 @@ class Ahead:
                 if one.id == condition.id:
                     if self.host.gpus and self._thread is not None:
                         self._thread.join()  # whose processes have these GPUs' memory
-                    seat = Seat(only(self.host.gpus) if self.host.gpus else {})
+                    seat = Seat(seeing_only(self.host.gpus) if self.host.gpus else {})
                     workers = Workers(replace(self.order, tier=tier), [seat], lambda text: None, self.warn)
                     (ended,) = workers.run([[Job("", *names, tuple(seeds))]])
                     self._note_crashes(one, seeds)

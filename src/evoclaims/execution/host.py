@@ -18,6 +18,20 @@ from typing import Final
 from evoclaims.core.errors import UserError
 from evoclaims.core.files import read_file
 
+VISIBLE: Final = "CUDA_VISIBLE_DEVICES"
+MEMORY: Final = "XLA_PYTHON_CLIENT_MEM_FRACTION"
+"""The share of a GPU's memory that jax takes when it starts: three quarters, unless it is configured otherwise."""
+
+SHARED_MEMORY: Final = 0.9
+"""What several processes on one GPU take of its memory together."""
+
+WITH_MPS: Final = 2
+"""Processes for a GPU where NVIDIA's MPS runs; without it they take turns, and two are slower than one."""
+
+_NODES: Final = Path("/dev")
+_PROCESSES: Final = Path("/proc")
+_DAEMON: Final = "nvidia-cuda-mps-control"
+
 AUTO: Final = 0
 """As many processes as are useful."""
 
@@ -71,21 +85,6 @@ def host_of(numprocesses: str, device: str, option: str = "--numprocesses") -> H
     return host
 
 
-VISIBLE: Final = "CUDA_VISIBLE_DEVICES"
-MEMORY: Final = "XLA_PYTHON_CLIENT_MEM_FRACTION"
-"""The share of a GPU's memory that jax takes when it starts: three quarters, unless it is configured otherwise."""
-
-SHARED_MEMORY: Final = 0.9
-"""What several processes on one GPU take of its memory together."""
-
-WITH_MPS: Final = 2
-"""Processes for a GPU where NVIDIA's MPS runs; without it they take turns, and two are slower than one."""
-
-_NODES: Final = Path("/dev")
-_PROCESSES: Final = Path("/proc")
-_DAEMON: Final = "nvidia-cuda-mps-control"
-
-
 def gpus(device: str) -> tuple[str, ...]:
     """Return the GPUs that jax would use for `device` ("auto", "cpu" or "gpu"), as CUDA_VISIBLE_DEVICES names them.
 
@@ -113,19 +112,19 @@ def mps_runs() -> bool:
         return False
 
 
-def shared(found: Sequence[str], processes: int) -> list[dict[str, str]]:
+def sharing_gpus(found: Sequence[str], processes: int) -> list[dict[str, str]]:
     """Return the environment of each of several processes that share some GPUs (at least one).
 
     Each has GPUs of its own, or several share one and its memory; a share that the user has set stays.
     """
     if processes <= len(found):
-        return [only(found[process::processes]) for process in range(processes)]
+        return [seeing_only(found[process::processes]) for process in range(processes)]
     crowds = [len(range(place, processes, len(found))) for place in range(len(found))]
     memory = [{} if MEMORY in os.environ else {MEMORY: f"{SHARED_MEMORY / crowd:.3f}"} for crowd in crowds]
     places = [process % len(found) for process in range(processes)]
-    return [only([found[place]]) | (memory[place] if crowds[place] > 1 else {}) for place in places]
+    return [seeing_only([found[place]]) | (memory[place] if crowds[place] > 1 else {}) for place in places]
 
 
-def only(found: Sequence[str]) -> dict[str, str]:
+def seeing_only(found: Sequence[str]) -> dict[str, str]:
     """Return the environment of a process that sees these GPUs alone."""
     return {VISIBLE: ",".join(found)}

@@ -17,7 +17,7 @@ from typing import IO, Any, Final
 
 import msgspec
 
-from evoclaims.execution.host import AUTO, Host, only, shared
+from evoclaims.execution.host import AUTO, Host, seeing_only, sharing_gpus
 from evoclaims.execution.job import Job, MissingBatch, sharing_programs
 from evoclaims.execution.worker import USER_ERROR, Ended, Reply, Told, WorkOrder
 from evoclaims.paper.reproduction import Conditions
@@ -336,7 +336,7 @@ def seats_of(host: Host, batches: Sequence[MissingBatch]) -> list[Seat]:
     if host.gpus and host.processes == AUTO:
         return _a_gpu_each(host.gpus, batches, host.together)
     if host.gpus:
-        return [Seat(environment) for environment in shared(host.gpus, host.processes)]
+        return [Seat(environment) for environment in sharing_gpus(host.gpus, host.processes)]
     processes = host.processes or useful_processes(batches, devices.usable_cores())
     return [Seat() for _ in range(min(processes, len(batches)))]
 
@@ -361,6 +361,6 @@ def _a_gpu_each(found: Sequence[str], batches: Sequence[MissingBatch], together:
         if wide < 2:
             continue
         taken, free = free[:wide], free[wide:]
-        seats.append(Seat(only(taken), batch.job, tuple(Seat(only([one])) for one in taken)))
+        seats.append(Seat(seeing_only(taken), batch.job, tuple(Seat(seeing_only([one])) for one in taken)))
     crowd = min(len(batches) - len(seats), len(free) * together)
-    return [*seats, *(map(Seat, shared(free, max(crowd, len(free)))) if free else ())]
+    return [*seats, *(map(Seat, sharing_gpus(free, max(crowd, len(free)))) if free else ())]
