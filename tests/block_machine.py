@@ -110,6 +110,31 @@ def run_parts(text: str, parts: int, rows: int, arrays: Sequence[Any], results: 
     return made
 
 
+def run_episodes(text: str, program: GpuProgram, rows: int, arrays: Sequence[Any], results: Sequence[Any]) -> list[Any]:
+    """Return the results of a kernel of `episode_kernel`, a block at a time; for the rest see `run`."""
+    text = text.replace("call void @llvm.nvvm.bar.warp.sync(i32 -1)", "call void %warp_waits()")
+    text = _for_this_processor(text).replace("ptr %anyone)", "ptr %anyone, ptr %warp_waits)")
+    code = machine_code.address(text, ENTRY)
+    read = [np.ascontiguousarray(a) for a in arrays]
+    made = [np.full(r.shape, 77, r.dtype) for r in results]
+    addresses = [ctypes.c_void_p(a.ctypes.data) for a in (*read, *made)]
+    types = [*[ctypes.c_void_p] * (len(addresses) + 1), *[ctypes.c_int32] * 4, CALLED, ASKED, CALLED]
+    kernel = ctypes.CFUNCTYPE(None, *types)(code)
+    nobody = ASKED(lambda _: 0)
+    for block in range(-(-rows // program.elements)):
+        memory = np.full(program.shared_bytes // 4, NOT_A_NUMBER, np.int32)
+        barriers = [threading.Barrier(BLOCK * program.warps), *(threading.Barrier(BLOCK) for _ in range(program.warps))]
+        wait, *of_warps = [CALLED(lambda barrier=barrier: barrier.wait(60) and None) for barrier in barriers]
+        places = [(block, lane, warp, 0) for warp in range(program.warps) for lane in range(BLOCK)]
+        given = [(*addresses, memory.ctypes.data, *place, wait, nobody, of_warps[place[2]]) for place in places]
+        threads = [threading.Thread(target=kernel, args=arguments) for arguments in given]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    return made
+
+
 def _anyone(barrier: threading.Barrier, votes: dict[int, int], vote: int) -> int:
     """Wait for all warps; return whether the vote of any is not 0."""
     votes[threading.get_ident()] = vote
@@ -130,6 +155,7 @@ def _for_this_processor(text: str) -> str:
         text = text.replace(f"call i32 @llvm.nvvm.read.ptx.sreg.{register}()", f"add i32 %{name}, 0")
     text = re.sub(r"call i32 @llvm.nvvm.shfl.sync.idx.i32\(i32 -1, (i32 %\w+),.*", r"add \1, 0", text)
     text = text.replace("call void @llvm.nvvm.barrier0()", "call void %wait()")
+    text = re.sub(r"call i1 @llvm.nvvm.vote.any.sync\(i32 -1, i1 (%?\w+)\)", r"or i1 \1, false", text)
     text = text.replace("call i32 @llvm.nvvm.barrier0.or(", "call i32 %anyone(")
     given = "ptr %numbers, i32 %block, i32 %lane, i32 %warp, i32 %team, ptr %wait, ptr %anyone"
     return re.sub(r"(define void @\w+\(.*?)\)", rf"\1, {given})", text)

@@ -121,7 +121,7 @@ def test_fewer_warps_share_the_work_where_shared_memory_is_scarce(monkeypatch: p
     widest = block_kernel.chosen(results, 1)
     assert widest is not None
     memory = widest.shared_bytes - 1
-    monkeypatch.setattr(block_kernel, "_of_device", lambda name, usual: 132 if name == "core_count" else memory)
+    monkeypatch.setattr(block_kernel, "processors_and_memory", lambda: (132, memory))
     narrower = block_kernel.chosen(results, 1)
     assert narrower is not None
     assert (widest.warps, narrower.warps) == (8, 4)

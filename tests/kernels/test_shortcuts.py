@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import functools
+from pathlib import Path
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from assembler import assemble, kernels_for_gpus
 from hypothesis import given
 from hypothesis import strategies as st
 from kernel_functions import FUNCTIONS, X
@@ -108,6 +110,14 @@ def test_the_short_way_is_taken_where_the_condition_is_false_in_all_lanes() -> N
     second = np.arange(3 * width) // width == 1
     np.testing.assert_array_equal(np.isnan(made), second & (x[:, 1] == 0))
     np.testing.assert_array_equal(made[~second], 0.0)
+
+
+def test_threads_of_a_gpus_warp_go_the_same_way(tmp_path: Path) -> None:
+    """Those that differ would execute both ways, one after the other."""
+    function, arguments = FUNCTIONS["a loop with a shortcut"]
+    (ptx,) = kernels_for_gpus(jax.vmap(one_kernel(function, "This")), *arguments)
+    assert "vote.sync.any.pred" in ptx
+    assemble(ptx, tmp_path)
 
 
 def test_a_loop_that_depends_on_a_seldom_condition_has_no_shortcut() -> None:

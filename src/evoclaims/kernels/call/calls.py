@@ -65,7 +65,7 @@ def on_gpu(program: GpuProgram, operands: Sequence[Array], shapes: Shapes, eleme
         program: the kernel.
         operands: the arrays it reads.
         shapes: of its results.
-        elements: of the batch; one for each lane of a team, or a lane for each of its parts.
+        elements: of the batch.
     """
     one = np.int32(1)
     return jax.ffi.ffi_call(GPU_TARGET, shapes)(
@@ -73,7 +73,7 @@ def on_gpu(program: GpuProgram, operands: Sequence[Array], shapes: Shapes, eleme
         name=program.name,
         kernel_type="ptx",
         kernel_data=program.ptx,
-        grid_x=np.int32(-(-elements * program.parts // (gpu_kernel.BLOCK * program.teams))),
+        grid_x=np.int32(-(-elements // program.elements)),
         grid_y=one,
         grid_z=one,
         block_x=np.int32(gpu_kernel.BLOCK),

@@ -156,13 +156,14 @@ class Kernel:
         if self._packed:
             parts, alike = self._packed
             text = part_kernel.text(parts, alike, self.read, shared, rows)
-            return gpu_kernel.program(text, self.name, parts=parts.count)
+            return gpu_kernel.program(text, self.name, gpu_kernel.BLOCK // parts.count)
         results = [self.results[i] for i in self.written]
         shape = block_kernel.chosen(results, rows)
         if shape is None:
             return gpu_kernel.program(gpu_kernel.text(results, self.read, shared, rows), self.name)
         text = block_kernel.text(shape, results, self.read, shared, rows)
-        return gpu_kernel.program(text, self.name, shape.warps, shape.teams, shape.shared_bytes)
+        elements = gpu_kernel.BLOCK * shape.teams
+        return gpu_kernel.program(text, self.name, elements, shape.warps, shape.teams, shape.shared_bytes)
 
     def _call(self, leaves: Sequence[Array], call: Callable[..., Any]) -> list[Array]:
         """Return the results of a kernel for every element of a batch.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import jax
 
@@ -72,7 +72,7 @@ def chosen(results: Sequence[Numbers], elements: int) -> BlockShape | None:
     operations = len(everything(numbers))
     if operations <= SMALL:
         return None
-    processors, memory = (_of_device(name, usual) for name, usual in (("core_count", 132), (MEMORY, 99 * 1024)))
+    processors, memory = processors_and_memory()
     teams = -(-elements // (BLOCK * processors))
     if teams not in WARPS and operations >= IN_TURNS:
         teams = 2
@@ -88,10 +88,10 @@ def chosen(results: Sequence[Numbers], elements: int) -> BlockShape | None:
     return None
 
 
-def _of_device(name: str, usual: int) -> int:
-    """Return a property of the GPU; a program may be lowered without a GPU."""
-    value: Any = getattr(jax.devices()[0], name, None)
-    return int(value) if value else usual
+def processors_and_memory() -> tuple[int, int]:
+    """Return the GPU's processors, and the bytes of shared memory that a block may have; usual ones without a GPU."""
+    device = jax.devices()[0]
+    return getattr(device, "core_count", None) or 132, getattr(device, MEMORY, None) or 99 * 1024
 
 
 SHARED = "@numbers = external addrspace(3) global [0 x i32], align 16\n"

@@ -57,9 +57,10 @@ class _Divisor:
 class GpuInstructions(Instructions):
     """Instructions of a thread. Quotients by one number share its reciprocal, as far as a basic block goes."""
 
-    def __init__(self) -> None:
-        """Start empty."""
+    def __init__(self, branches: bool = False) -> None:
+        """Start empty; with `branches`, quotients and roots are those of NVIDIA's assembler."""
         super().__init__(1)
+        self._with_branches = branches
         self._divisors: dict[str, _Divisor] = {}
 
     def label(self, name: str) -> None:
@@ -69,6 +70,8 @@ class GpuInstructions(Instructions):
 
     def divided(self, dividend: str, divisor: str) -> str:
         """Write a quotient of two floats; return its register."""
+        if self._with_branches:
+            return super().divided(dividend, divisor)
         if divisor not in self._divisors:
             self._divisors[divisor] = self._divisor(divisor)
         by = self._divisors[divisor]
@@ -96,6 +99,8 @@ class GpuInstructions(Instructions):
 
     def root(self, number: str) -> str:
         """Write a square root of a float; return its register."""
+        if self._with_branches:
+            return super().root(number)
         half = literal(np.float32(0.5))
         small = self.put(f"fcmp olt float {number}, {literal(SMALL_SQUARE)}")
         x = self._product(number, self._either(small, GROWN, np.float32(1)))
@@ -106,6 +111,10 @@ class GpuInstructions(Instructions):
         left = self._fma(self._negative(root), root, x)
         root = self._corrected(self._fma(left, slope, root), self._approximate("sqrt", x))
         return self._product(root, self._either(small, SHRUNK, np.float32(1)))
+
+    def in_any_lane(self, condition: str) -> str:
+        """Return whether a condition is true in any thread of the warp: else it would go both ways, one by one."""
+        return self.call("llvm.nvvm.vote.any.sync", "i1", [("i32", "-1"), ("i1", condition)])
 
     def _either(self, condition: str, yes: Number, no: Number) -> str:
         return self.put(f"select i1 {condition}, float {literal(yes)}, float {literal(no)}")

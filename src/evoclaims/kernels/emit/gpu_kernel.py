@@ -35,7 +35,7 @@ def text(results: Sequence[Numbers], arrays: Mapping[int, ArrayRow], shared: Map
     numbers = [number for result in results for number in result.flat]
     # Without the branches of divisions, longer code would be one block, which NVIDIA's assembler orders for minutes
     # and spills more of.
-    page = GpuInstructions() if len(everything(numbers)) <= SMALL else Instructions(1)
+    page = GpuInstructions(branches=len(everything(numbers)) > SMALL)
     element = Element(page, begin(page, rows), arrays, shared)
     registers: dict[int, str] = {}
     page.compute(in_order(numbers), registers, element.load)
@@ -132,28 +132,30 @@ class GpuProgram:
     Attributes:
         ptx: the assembly language of these GPUs.
         name: of the kernel in it, which profilers show.
-        warps: of a team, which share the work for 32 elements.
+        elements: of the batch that a block computes.
+        warps: of a team.
         teams: of a block.
         shared_bytes: of a block's memory.
-        parts: of an element, each of which has a thread.
     """
 
     ptx: str
     name: str
+    elements: int = BLOCK
     warps: int = 1
     teams: int = 1
     shared_bytes: int = 0
-    parts: int = 1
 
 
-def program(text: str, name: str, warps: int = 1, teams: int = 1, shared_bytes: int = 0, parts: int = 1) -> GpuProgram:
+def program(
+    text: str, name: str, elements: int = BLOCK, warps: int = 1, teams: int = 1, shared_bytes: int = 0
+) -> GpuProgram:
     """Return LLVM's text of a kernel as a program; for the rest see `GpuProgram`."""
     symbol = re.sub(r"\W+", "_", name.lower(), flags=re.ASCII).strip("_")
     if not symbol[:1].isalpha():
         symbol = f"{ENTRY}_{symbol}"
     module = llvm.parse_assembly(text.replace(f"@{ENTRY}(", f"@{symbol}("))
     module.verify()
-    return GpuProgram(str(_target().emit_assembly(module)), symbol, warps, teams, shared_bytes, parts)
+    return GpuProgram(str(_target().emit_assembly(module)), symbol, elements, warps, teams, shared_bytes)
 
 
 @cache

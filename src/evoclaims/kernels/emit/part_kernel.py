@@ -263,7 +263,7 @@ class _Writer:
             return self._carry(layout, around.results)
         self.need([choice.condition, *choice.taken])
         condition = self._value([term(choice.condition)])
-        anywhere = page.call("llvm.nvvm.vote.any.sync", "i1", [EVERYONE, ("i1", condition)])
+        anywhere = page.in_any_lane(condition)
         before = self._registers
 
         def way(numbers: Sequence[Number]) -> list[str]:
