@@ -156,17 +156,34 @@ def played(
         The last state; the sum of rewards; and, leaves [horizon, …], what `note` returns of each state that was
         reached, with whether the step belongs to the episode (None without `note`).
     """
-
-    def step(carry: tuple[TaskState, Array, Array], _: None) -> tuple[tuple[TaskState, Array, Array], Any]:
-        state, total, alive = carry
-        following = task.step(state, policy(state.observation))
-        noted = None if note is None else (note(following), alive)
-        total = total + jnp.where(alive, following.reward, 0.0)
-        ended = following.terminated | following.truncated
-        return (select(alive, following, state), total, alive & ~ended), noted
-
-    (state, total, _), way = jax.lax.scan(step, (start, jnp.zeros(()), jnp.ones((), bool)), None, length=task.horizon)
+    (state, total, _), way = played_on(task, policy, (start, jnp.zeros(()), jnp.ones((), bool)), note)
     return state, total, way
+
+
+Played = tuple[TaskState, Float[Array, ""], Bool[Array, ""]]
+"""An episode so far: its state, the sum of its rewards, and whether it goes on."""
+
+
+def played_on(
+    task: Task, policy: PolicyFn, so_far: Played, note: Callable[[TaskState], Any] | None = None
+) -> tuple[Played, Any]:
+    """Play `horizon` steps; see `played`."""
+
+    def step(before: Played, _: None) -> tuple[Played, Any]:
+        following = task.step(before[0], policy(before[0].observation))
+        noted = None if note is None else (note(following), before[2])
+        return counted(before, following), noted
+
+    made: tuple[Played, Any] = jax.lax.scan(step, so_far, None, length=task.horizon)
+    return made
+
+
+def counted(before: Played, following: TaskState) -> Played:
+    """Return an episode after a step to `following`, which counts if the episode has not ended before."""
+    state, total, alive = before
+    total = total + jnp.where(alive, following.reward, 0.0)
+    ended = following.terminated | following.truncated
+    return select(alive, following, state), total, alive & ~ended
 
 
 @runtime_checkable

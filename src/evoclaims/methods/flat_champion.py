@@ -9,7 +9,7 @@ from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 from evoclaims.core.pytree import pytree, select
 from evoclaims.envs.base import Episode, PolicyFn, Task
 from evoclaims.methods.base import Policy
-from evoclaims.networks.base import Network
+from evoclaims.networks.base import Bound, Network
 
 
 @pytree
@@ -27,7 +27,7 @@ class Champion:
 
 def policy_of(network: Network, task: Task, parameters: Float[Array, " parameters"]) -> PolicyFn:
     """Bind parameters to a network of the task's sizes."""
-    return lambda observation: network.apply(parameters, observation, task.action_size)
+    return Bound(network, parameters, task.action_size)
 
 
 def evaluate(

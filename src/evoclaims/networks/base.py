@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Protocol
 
 from jaxtyping import Array, Float
@@ -20,3 +21,22 @@ class Network(Protocol):
         self, parameters: Float[Array, " parameters"], observation: Float[Array, " inputs"], outputs: int
     ) -> Float[Array, " outputs"]:
         """Map one observation to one output."""
+
+
+@dataclass(frozen=True)
+class Bound:
+    """A network with its parameters: a policy.
+
+    Attributes:
+        network: what computes actions.
+        parameters: its flat vector, shape [parameters].
+        outputs: numbers in an action.
+    """
+
+    network: Network
+    parameters: Float[Array, " parameters"]
+    outputs: int
+
+    def __call__(self, observation: Float[Array, " inputs"]) -> Float[Array, " outputs"]:
+        """Return the action."""
+        return self.network.apply(self.parameters, observation, self.outputs)

@@ -18,7 +18,7 @@ from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 from evoclaims.core.errors import UserError, require_at_least
 from evoclaims.core.keys import streams
 from evoclaims.core.pytree import pytree, select, strong
-from evoclaims.envs.base import Episode, PolicyFn, TaskState, averaged, fitting, played
+from evoclaims.envs.base import Episode, Played, PolicyFn, TaskState, averaged, counted, fitting, played, played_on
 from evoclaims.envs.ecorobot import physics
 from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.fidelity import require_fidelity, require_likeness
@@ -27,7 +27,9 @@ from evoclaims.envs.ecorobot.pose import Pose, torso
 from evoclaims.envs.ecorobot.robots import SIMPLE_ROB, Robot, fits_as_built_in
 from evoclaims.envs.ecorobot.scene import Places, Scene, scene
 from evoclaims.envs.ecorobot.sensors import Sensor
-from evoclaims.kernels import one_kernel
+from evoclaims.kernels import in_one_kernel, one_kernel
+from evoclaims.networks.base import Bound
+from evoclaims.networks.mlp import Mlp
 
 
 @pytree
@@ -305,8 +307,11 @@ class RobotTask(ABC):
 
     def _play(self, policy: PolicyFn, key: PRNGKeyArray, level: Int[Array, ""], follow: bool) -> Episode:
         """Play to the end; with `follow`, record the path for `path_measures`."""
-        note = (lambda state: state.inner.pose.place[:2]) if follow else None
-        state, total, way = played(self, policy, self.reset(key, level), note)
+        start = self.reset(key, level)
+        if follow:
+            state, total, way = played(self, policy, start, lambda state: state.inner.pose.place[:2])
+        else:
+            (state, total), way = self._played(policy, start), ()
         outing: Outing = state.inner
         steps = outing.time.astype(jnp.float32)
         metrics = {
@@ -321,6 +326,18 @@ class RobotTask(ABC):
             **(self.path_measures(*way) if follow else {}),
         }
         return Episode(fitness=total, success=metrics["reached"], metrics=metrics)
+
+    def _played(self, policy: PolicyFn, start: TaskState) -> tuple[TaskState, Float[Array, ""]]:
+        """Play from `start`; on a GPU, a perceptron's whole episode is one kernel (`in_one_kernel`)."""
+        network = policy.network if isinstance(policy, Bound) else None
+        if not isinstance(network, Mlp) or network.skip or type(self).step is not RobotTask.step:
+            state, total, _ = played(self, policy, start)
+        else:
+            assert isinstance(policy, Bound)
+            so_far = (start, jnp.zeros(()), jnp.ones((), bool))
+            play = _episode_kernel(self.with_numbers(None), network)
+            state, total, _ = play(so_far, policy.parameters, self.numbers)
+        return state, total
 
     def _observe(self, outing: Outing) -> Float[Array, " observation"]:
         """Return positions, velocities, readings, and whatever `shown` adds."""
@@ -359,3 +376,17 @@ def _step_kernel(task: RobotTask) -> Callable[[TaskState, Array, Places], TaskSt
         f"A step of {task.name}",
         parts=lambda state, action, places: limbs_of(task.scene, state),
     )
+
+
+@lru_cache(maxsize=64)
+def _episode_kernel(task: RobotTask, network: Mlp) -> Callable[[Played, Array, Places], Played]:
+    """Return an episode of a perceptron, with its parameters and the boxes' places as arguments."""
+
+    def play(so_far: Played, parameters: Array, places: Places) -> Played:
+        return played_on(task.with_numbers(places), Bound(network, parameters, task.action_size), so_far)[0]
+
+    def step(before: Played, action: Array, places: Places) -> Played:
+        return counted(before, task.with_numbers(places).plain_step(before[0], action))
+
+    widths = (task.observation_size, *network.layers, task.action_size)
+    return in_one_kernel(play, step, task.horizon, widths, f"An episode of {task.name}")
