@@ -22,6 +22,15 @@ FAST_TO_COMPILE: Final = {"xla_backend_optimization_level": 1, "xla_llvm_disable
 SIDE_BY_SIDE: Final = {"xla_gpu_command_buffer_scheduling_mode": "CONCURRENT"}
 """Small kernels that do not need each other run at the same time: a step of PPO on the gates takes 0.6 of the time."""
 
+BRIEF: Final = 100_000
+"""On a GPU, a method's step of fewer environment steps waits for the host, which reads the conditions of loops."""
+
+LOOPS_ON_GPU: Final = {
+    # XLA's own choice, and the last two
+    "xla_gpu_enable_command_buffer": "FUSION,CUBLAS,CUBLASLT,CUSTOM_CALL,CUDNN,DYNAMIC_SLICE_FUSION,CONDITIONAL,WHILE"
+}
+"""The GPU reads conditions itself. Not with `SIDE_BY_SIDE`: such programs have hung."""
+
 
 class Layout(Enum):
     """Whether each trial is a call of its own, or trials run side by side in a call.
@@ -50,7 +59,8 @@ class Layout(Enum):
     def options(self, condition: Condition) -> dict[str, Any] | None:
         """Return the compiler options; they depend only on condition and layout, so that bits do, too."""
         if not self.alone:
-            return SIDE_BY_SIDE
+            brief = condition.cost < BRIEF
+            return LOOPS_ON_GPU if brief else SIDE_BY_SIDE
         return FAST_TO_COMPILE if condition.environment_steps <= SHORT else None
 
     def width(self, active: int, full: int, devices: int) -> int:

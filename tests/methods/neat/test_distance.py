@@ -20,7 +20,8 @@ from reference import Node
 from evoclaims.kernels.emit import group_kernel
 from evoclaims.kernels.emit.gpu_kernel import GpuProgram
 from evoclaims.kernels.genomes.gpu_distance import Comparison
-from evoclaims.methods.neat.homology import STEP, _compared_with, _comparison, distance, distances, turned
+from evoclaims.methods.neat import homology
+from evoclaims.methods.neat.homology import STEP, _compared_with, _comparison, arranged, distance, distances
 from evoclaims.methods.neat.settings import Species
 from evoclaims.networks.genome import Genome
 
@@ -50,49 +51,69 @@ def test_the_distance_of_two_small_genomes_is_the_one_worked_out_by_hand() -> No
 
 
 GENOMES, CENTRES = 4, 3
-COMPARISON = Comparison(2.5, 0.7, GENOMES, NODES, CONNECTIONS, STEP)
-KERNEL = _comparison(COMPARISON, CENTRES)
-_in_jax = jax.jit(lambda *given: KERNEL.function(*given)[0])  # each of its operations alone takes three times as long
-_distances = jax.jit(
-    lambda population, *given: distances(Species(disjoint=2.5, difference=0.7), turned(population), *given)
-)
 
 
-def _given(population: Genome, centres: Genome, count: Any) -> list[Any]:
-    """Return the kernel's arguments but the pair's number."""
-    return [*jax.tree.leaves(turned(population)), *_compared_with(COMPARISON, centres), jnp.int32(count)]
+class _Way:
+    """The distances of a population of which each genome is by itself, or of one that is arranged gene by gene."""
+
+    def __init__(self, by_gene: bool) -> None:
+        self.by_gene = by_gene
+        self.comparison = Comparison(2.5, 0.7, GENOMES, by_gene, NODES, CONNECTIONS, STEP)
+        self.kernel = _comparison(self.comparison, CENTRES)
+        # Each operation alone takes three times as long.
+        self.in_jax = jax.jit(lambda *given: self.kernel.function(*given)[0])
+        self.by_this_processor = jax.jit(self.by_kernel)
+
+    def by_kernel(self, population: Genome, *given: Any) -> Any:
+        """Return what `distances` does."""
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(homology, "LARGE", GENOMES + (not self.by_gene))
+            return distances(Species(disjoint=2.5, difference=0.7), arranged(population), *given)
+
+    def given(self, population: Genome, centres: Genome, count: Any) -> list[Any]:
+        """Return the kernel's arguments but the pair's number."""
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(homology, "LARGE", GENOMES + (not self.by_gene))
+            leaves = jax.tree.leaves(arranged(population))
+        return [*leaves, *_compared_with(self.comparison, centres), jnp.int32(count)]
+
+    def by_a_gpus_threads(self, population: Genome, centres: Genome, count: Any) -> Any:
+        """Return the distances that the kernel for GPUs finds, run by threads of the processor."""
+
+        def call(groups: int, rows: int, own: list[bool], operands: list[Any], shapes: Any) -> Any:
+            text = group_kernel.gpu_text(self.kernel.write, self.kernel.sizes, groups, rows, own)
+            return run(text, GpuProgram("", self.kernel.name), groups * rows, operands, shapes)
+
+        given = [leaf[None] for leaf in self.given(population, centres, count)]
+        (made,) = self.kernel._call([*given, jnp.arange(CENTRES * GENOMES, dtype=jnp.int32)], call)
+        return made.reshape(CENTRES, GENOMES)
 
 
-def _by_a_gpus_threads(population: Genome, centres: Genome, count: Any) -> Any:
-    """Return the distances that the kernel for GPUs finds, run by threads of the processor."""
-
-    def call(groups: int, rows: int, own: list[bool], operands: list[Any], shapes: Any) -> Any:
-        text = group_kernel.gpu_text(KERNEL.write, KERNEL.sizes, groups, rows, own)
-        return run(text, GpuProgram("", KERNEL.name), groups * rows, operands, shapes)
-
-    given = [leaf[None] for leaf in _given(population, centres, count)]
-    (made,) = KERNEL._call([*given, jnp.arange(CENTRES * GENOMES, dtype=jnp.int32)], call)
-    return made.reshape(CENTRES, GENOMES)
+WAYS = {"genome by genome": _Way(by_gene=False), "gene by gene": _Way(by_gene=True)}
 
 
-@settings(max_examples=40, deadline=None)
-@given(st.lists(dags(activations=3), min_size=GENOMES, max_size=GENOMES), st.integers(0, CENTRES))
-def test_all_distances_at_once_are_those_of_each_pair(genomes: list[Genome], count: int) -> None:
+@pytest.mark.parametrize("name", WAYS)
+@settings(max_examples=20, deadline=None)
+@given(genomes=st.lists(dags(activations=3), min_size=GENOMES, max_size=GENOMES), count=st.integers(0, CENTRES))
+def test_all_distances_at_once_are_those_of_each_pair(name: str, genomes: list[Genome], count: int) -> None:
     """By a processor's kernel, a GPU's threads, and the function in jax; infinite to centres that do not count."""
     population, centres = stacked(genomes), stacked(genomes[1:])
     wanted = np.full((CENTRES, GENOMES), np.inf)
     for place in range(count):
         wanted[place] = [_weighted(one, genomes[1 + place]) for one in genomes]
-    given_ = _given(population, centres, count)
-    in_jax = [_in_jax(*given_, jnp.int32(pair)) for pair in (0, 5, 11)]
+    way = WAYS[name]
+    given_ = way.given(population, centres, count)
+    in_jax = [way.in_jax(*given_, jnp.int32(pair)) for pair in (0, 5, 11)]
     np.testing.assert_allclose(in_jax, wanted.ravel()[[0, 5, 11]], rtol=1e-5, atol=1e-6)
-    ways = _distances, _by_a_gpus_threads
-    for made_ in [way(population, centres, jnp.int32(count)) for way in ways]:
-        np.testing.assert_allclose(made_, wanted, rtol=1e-5, atol=1e-6)
+    for compute in (way.by_this_processor, way.by_a_gpus_threads):
+        np.testing.assert_allclose(compute(population, centres, jnp.int32(count)), wanted, rtol=1e-5, atol=1e-6)
 
 
-def test_trials_on_a_gpu_share_one_kernel_and_no_genome_is_copied_for_each_centre(tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", WAYS)
+def test_trials_on_a_gpu_share_one_kernel_and_no_genome_is_copied_for_each_centre(name: str, tmp_path: Path) -> None:
     population = stacked([stacked([made([0, 1, 2], {(0, 2): 1.0})] * GENOMES)] * 2)
-    (ptx,) = kernels_for_gpus(jax.vmap(_distances), population, at(population, np.s_[:, :CENTRES]), np.int32([1, 2]))
+    (ptx,) = kernels_for_gpus(
+        jax.vmap(WAYS[name].by_kernel), population, at(population, np.s_[:, :CENTRES]), np.int32([1, 2])
+    )
     assert ".entry the_distances_of_genomes(" in ptx
     assemble(ptx, tmp_path)

@@ -25,6 +25,7 @@ class Comparison:
     Attributes:
         disjoint, difference: weights in the distance (`Species`).
         population: genomes that are compared.
+        by_gene: whether their leaves are [genes, population], so that the threads of a warp read neighbours.
         nodes, connections: capacities.
         step: keys that are compared at a time; lists of a centre's keys have a multiple of it.
     """
@@ -32,6 +33,7 @@ class Comparison:
     disjoint: float
     difference: float
     population: int
+    by_gene: bool
     nodes: int
     connections: int
     step: int
@@ -46,9 +48,8 @@ class Comparison:
 
         Args:
             rows: pairs of a centre and a genome.
-            groups: addresses of the population's leaves, gene by gene, so that the threads of a warp read neighbours;
-                of the centres' keys, biases, responses, activations, weights between slots, [target, source] with
-                NaN for none, and counts; and of how many centres count.
+            groups: addresses of the population's leaves; of the centres' keys, biases, responses, activations, weights
+                between slots, [target, source] with NaN for none, and counts; and of how many centres count.
             row: of the first pair's number, centre by centre.
             results: of its distance, or inf.
         """
@@ -73,11 +74,10 @@ class _Pair:
         self, of: Comparison, page: Instructions, slots: str, groups: Sequence[str], place: str, genome: str
     ) -> None:
         """Find the leaves; `slots` is room for the centre's slot of each node."""
-        self.of, self.page, self.slots, self.genome = of, page, slots, genome
-        self.own = groups[:9]
-        sizes = of.keys, *[of.nodes] * 3, of.nodes**2, 1, 1
-        starts = [page.put(f"mul i32 {place}, {size}") for size in sizes]
-        self.centre = [at(page, array, start) for array, start in zip(groups[9:16], starts, strict=True)]
+        self.of, self.page, self.slots = of, page, slots
+        genes = [1] * 9 if of.by_gene else [*[of.nodes] * 4, *[of.connections] * 3, 1, 1]
+        self.own = self._rows(groups[:9], genome, genes)
+        self.centre = self._rows(groups[9:16], place, [of.keys, *[of.nodes] * 3, of.nodes**2, 1, 1])
 
     def distance(self) -> str:
         """Return the bits of the distance."""
@@ -120,8 +120,12 @@ class _Pair:
 
     def _own(self, array: str, gene: str) -> str:
         """Return a number of the genome."""
-        begin = self.page.put(f"mul i32 {gene}, {self.of.population}")
-        return load(self.page, array, self.page.put(f"add i32 {begin}, {self.genome}"))
+        return load(self.page, array, self.page.put(f"mul i32 {gene}, {self.of.population if self.of.by_gene else 1}"))
+
+    def _rows(self, arrays: Sequence[str], number: str, sizes: Sequence[int]) -> list[str]:
+        """Return the addresses of a row of each array."""
+        starts = [self.page.put(f"mul i32 {number}, {size}") for size in sizes]
+        return [at(self.page, array, start) for array, start in zip(arrays, starts, strict=True)]
 
     def _apart(self, one: str, other: str) -> str:
         """Return by how much two numbers differ, given their bits."""

@@ -21,6 +21,8 @@ from evoclaims.networks.genome import EMPTY, Connections, Genome, Nodes
 
 Weights = Callable[[Genome, Array, Array], Array]
 """Returns the weights of a genome's connections between pairs of slots, or NaN; of a slot of -1, anything."""
+LARGE: Final = 2_048
+"""From so many genomes on, turning their arrays takes GPUs less time than reading each genome for itself."""
 STEP: Final = 4
 """Numbers that a GPU's thread compares at a time."""
 NOWHERE: Final = -1
@@ -207,8 +209,10 @@ def distance(settings: Species, genome: Genome, other: Genome) -> Float[Array, "
     )
 
 
-def turned(population: Genome) -> Genome:
-    """Return a population gene by gene, as `distances` takes it: the last axis of each leaf is that of genomes."""
+def arranged(population: Genome) -> Genome:
+    """Return a population as `distances` takes it: a large one gene by gene, the last axis that of genomes."""
+    if population.node_count.shape[0] < LARGE:
+        return population
     by_gene: Genome = jax.tree.map(lambda leaf: jnp.moveaxis(leaf, 0, -1), population)
     return by_gene
 
@@ -219,11 +223,12 @@ def distances(
     """Return each genome's distance to each of the first `count` centres, leaves [places, …]; inf to the others.
 
     For GPUs that run kernels: there all are compared at once. Sums are in another order than those of `distance`.
-    The population is `turned`.
+    The population is `arranged`.
     """
-    (nodes, size), connections = population.nodes.key.shape, population.connections.weight.shape[0]
+    nodes, connections = centres.nodes.key.shape[-1], centres.connections.weight.shape[-1]
+    size = population.node_count.shape[0]
     places = centres.node_count.shape[0]
-    comparison = Comparison(settings.disjoint, settings.difference, size, nodes, connections, STEP)
+    comparison = Comparison(settings.disjoint, settings.difference, size, size >= LARGE, nodes, connections, STEP)
     kernel, given = _comparison(comparison, places), _compared_with(comparison, centres)
     pairs = jnp.arange(places * size, dtype=jnp.int32)
     (made,) = jax.vmap(lambda pair: kernel(*jax.tree.leaves(population), *given, count, pair))(pairs)
@@ -246,11 +251,12 @@ def _comparison(of: Comparison, places: int) -> GroupKernel:
         return jax.ShapeDtypeStruct(shape, dtype)
 
     whole, numbers = partial(shaped, jnp.int32), partial(shaped, jnp.float32)
-    nodes, connections, size = of.nodes, of.connections, of.population
-    genes = whole(nodes, size), numbers(nodes, size), numbers(nodes, size), whole(nodes, size)
-    links = whole(connections, size), whole(connections, size), numbers(connections, size)
-    attributes = numbers(places, nodes), numbers(places, nodes), whole(places, nodes)
-    centres = whole(places, of.keys), *attributes, numbers(places, nodes, nodes), whole(places), whole(places)
+    size = of.population
+    nodes, connections = ((n, size) if of.by_gene else (size, n) for n in (of.nodes, of.connections))
+    genes = whole(*nodes), numbers(*nodes), numbers(*nodes), whole(*nodes)
+    links = whole(*connections), whole(*connections), numbers(*connections)
+    attributes = numbers(places, of.nodes), numbers(places, of.nodes), whole(places, of.nodes)
+    centres = whole(places, of.keys), *attributes, numbers(places, of.nodes, of.nodes), whole(places), whole(places)
     return GroupKernel(
         name="The distances of genomes",
         function=partial(_compared, of),
@@ -266,7 +272,7 @@ def _compared(of: Comparison, *leaves: Array) -> list[Array]:
     """Return the distance that the kernel finds."""
     population, (key, *attributes, matrix, nodes, connections, count, pair) = leaves[:9], leaves[9:]
     place, number = pair // of.population, pair % of.population
-    own = [leaf[..., number] for leaf in population]
+    own = [leaf[..., number] if of.by_gene else leaf[number] for leaf in population]
     genome = Genome(Nodes(*own[:4]), Connections(*own[4:7]), *own[7:])
     target, source = jnp.nonzero(~jnp.isnan(matrix[place]), size=of.connections, fill_value=0)
     genes = Connections(source.astype(jnp.int32), target.astype(jnp.int32), matrix[place, target, source])

@@ -15,7 +15,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from evoclaims.core.pytree import pytree
 from evoclaims.kernels import by_platform, gpus_run_kernels, take_rows
-from evoclaims.methods.neat.homology import distance, distances, turned
+from evoclaims.methods.neat.homology import arranged, distance, distances
 from evoclaims.methods.neat.settings import Species
 from evoclaims.networks.genome import Genome
 
@@ -134,7 +134,7 @@ def _grouped_at_once(settings: Species, centres: Genome, count: Int[Array, ""], 
 
     def to_founder(founder: Genome) -> Array:
         alone = jax.tree.map(lambda leaf: leaf[None], founder)
-        return distances(settings, by_gene, alone, jnp.ones((), jnp.int32))[0]
+        return distances(settings, as_compared, alone, jnp.ones((), jnp.int32))[0]
 
     def recentred(chosen: Array) -> Array:
         """Choose for each old centre the nearest genome that is not `chosen` for an earlier one."""
@@ -144,13 +144,13 @@ def _grouped_at_once(settings: Species, centres: Genome, count: Int[Array, ""], 
         return jnp.where(places < count, nearest, NONE)
 
     everyone, places = jnp.arange(population.node_count.shape[0]), jnp.arange(settings.most, dtype=jnp.int32)
-    by_gene = turned(population)  # once, and not for each founder
-    to_old = distances(settings, by_gene, centres, count)
+    as_compared = arranged(population)  # once, and not for each founder
+    to_old = distances(settings, as_compared, centres, count)
     # One after the other would be as many rounds as species. Two seldom want the same genome.
     wanted = recentred(jnp.full((settings.most,), NONE, jnp.int32))
     chosen = jax.lax.while_loop(lambda chosen: jnp.any(recentred(chosen) != chosen), recentred, wanted)
     centre_of = jnp.where(chosen == NONE, 0, chosen)
-    to_new = distances(settings, by_gene, take_rows(population, centre_of), count)
+    to_new = distances(settings, as_compared, take_rows(population, centre_of), count)
     is_centre = chosen[:, None] == everyone[None, :]
     # A centre stays in its own species, even where another one's is its equal; one of several species in the last.
     own = -1.0 - places[:, None].astype(jnp.float32)
