@@ -18,6 +18,7 @@ from evoclaims.envs.ecorobot import robot_task
 from evoclaims.envs.ecorobot.stones import SteppingStones
 from evoclaims.kernels import in_one_kernel
 from evoclaims.kernels.call import episode
+from evoclaims.kernels.emit import gpu_kernel
 from evoclaims.kernels.emit.episode_kernel import Perceptron, episodes_of_a_block
 from evoclaims.networks.base import Bound
 from evoclaims.networks.mlp import Mlp
@@ -132,13 +133,32 @@ def test_trials_on_a_gpu_play_in_one_kernel(tmp_path: Path) -> None:
     assemble(ptx, tmp_path)
 
 
-def test_a_task_with_steps_of_its_own_is_played_by_them() -> None:
-    class Slow(SteppingStones):
-        def step(self, state: Any, action: Any) -> Any:
-            return super().step(state, action / 2)
+def test_a_step_that_several_warps_would_share_is_a_kernel_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    inputs, layers, outputs = SIZES["two of them"]
+    network = Mlp(layers)
+    monkeypatch.setattr(gpu_kernel, "SMALL", 10)
+    assert kernels_for_gpus(_played(network, inputs, outputs)[1], *_arguments(network, inputs, outputs)) == []
 
-    network = Mlp((8,))
-    for kind, kernels in ((SteppingStones, 1), (Slow, 0)):
+
+class Slow(SteppingStones):
+    """Takes half of what the policy says."""
+
+    def step(self, state: Any, action: Any) -> Any:
+        """Act."""
+        return super().step(state, action / 2)
+
+
+class Doubled(Mlp):
+    """Says twice what a perceptron does."""
+
+    def apply(self, parameters: Any, observation: Any, outputs: int) -> Any:
+        """Act."""
+        return 2 * super().apply(parameters, observation, outputs)
+
+
+def test_tasks_with_steps_of_their_own_and_other_networks_are_played_step_by_step() -> None:
+    cases = (SteppingStones, Mlp((8,)), 1), (Slow, Mlp((8,)), 0), (SteppingStones, Mlp((8,), skip=True), 0)
+    for kind, network, kernels in (*cases, (SteppingStones, Doubled((8,)), 0)):
         task = kind(episode_steps=2)
         policy = Bound(network, jnp.zeros(network.size(task.observation_size, task.action_size)), task.action_size)
         traced = jax.make_jaxpr(lambda key, task=task, policy=policy: task.episode(policy, key, jnp.int32(0)))

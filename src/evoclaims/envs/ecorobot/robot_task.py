@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache, partial
-from typing import Any, ClassVar, Final
+from typing import Any, ClassVar, Final, TypeGuard
 
 import jax
 import jax.numpy as jnp
@@ -28,7 +28,7 @@ from evoclaims.envs.ecorobot.robots import SIMPLE_ROB, Robot, fits_as_built_in
 from evoclaims.envs.ecorobot.scene import Places, Scene, scene
 from evoclaims.envs.ecorobot.sensors import Sensor
 from evoclaims.kernels import in_one_kernel, one_kernel
-from evoclaims.networks.base import Bound
+from evoclaims.networks.base import Bound, Network
 from evoclaims.networks.mlp import Mlp
 
 
@@ -329,13 +329,11 @@ class RobotTask(ABC):
 
     def _played(self, policy: PolicyFn, start: TaskState) -> tuple[TaskState, Float[Array, ""]]:
         """Play from `start`; on a GPU, a perceptron's whole episode is one kernel (`in_one_kernel`)."""
-        network = policy.network if isinstance(policy, Bound) else None
-        if not isinstance(network, Mlp) or network.skip or type(self).step is not RobotTask.step:
+        if not isinstance(policy, Bound) or not _is_dense(policy.network) or type(self).step is not RobotTask.step:
             state, total, _ = played(self, policy, start)
         else:
-            assert isinstance(policy, Bound)
             so_far = (start, jnp.zeros(()), jnp.ones((), bool))
-            play = _episode_kernel(self.with_numbers(None), network)
+            play = _episode_kernel(self.with_numbers(None), policy.network)
             state, total, _ = play(so_far, policy.parameters, self.numbers)
         return state, total
 
@@ -376,6 +374,11 @@ def _step_kernel(task: RobotTask) -> Callable[[TaskState, Array, Places], TaskSt
         f"A step of {task.name}",
         parts=lambda state, action, places: limbs_of(task.scene, state),
     )
+
+
+def _is_dense(network: Network) -> TypeGuard[Mlp]:
+    """Whether a network computes what the kernel of episodes does; one that is built on `Mlp` may compute otherwise."""
+    return type(network) is Mlp and not network.skip
 
 
 @lru_cache(maxsize=64)
