@@ -14,9 +14,8 @@ from assembler import assemble, kernels_for_gpus
 from block_machine import run_episodes
 
 from evoclaims.envs.base import played
-from evoclaims.envs.ecorobot import robot_task
 from evoclaims.envs.ecorobot.stones import SteppingStones
-from evoclaims.kernels import in_one_kernel
+from evoclaims.kernels import episode_in_one_kernel
 from evoclaims.kernels.call import episode
 from evoclaims.kernels.emit import gpu_kernel
 from evoclaims.kernels.emit.episode_kernel import Perceptron, episodes_of_a_block
@@ -42,14 +41,14 @@ def _step(state: Any, action: Any, constants: Any) -> Any:
 
 
 def _played(network: Mlp, inputs: int, outputs: int) -> tuple[Callable[..., Any], Callable[..., Any]]:
-    """Return episodes of two trials' populations, step by step and as `in_one_kernel` returns them."""
+    """Return episodes of two trials' populations, step by step and as `episode_in_one_kernel` returns them."""
 
     def play(state: Any, parameters: Any, constants: Any) -> Any:
         for _ in range(STEPS):
             state = _step(state, network.apply(parameters, state[0], outputs), constants)
         return state
 
-    kernel = in_one_kernel(play, _step, STEPS, (inputs, *network.layers, outputs), "This episode")
+    kernel = episode_in_one_kernel(play, _step, STEPS, (inputs, *network.layers, outputs), "This episode")
     of_trials = {"bound": 0, "gain": None}
     one, other = (jax.vmap(jax.vmap(f, (0, 0, None)), (0, 0, of_trials)) for f in (play, kernel))
     return one, other
@@ -69,20 +68,21 @@ def _arguments(network: Mlp, inputs: int, outputs: int) -> Any:
 @pytest.fixture
 def on_threads(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """Have a GPU's kernels run by threads of this processor; the programs that ran are in the list."""
-    texts: list[str] = []
+    texts: dict[str, str] = {}
     programs: list[Any] = []
-    write = episode.episode_kernel.text
+    compiled = gpu_kernel.program
 
-    def text(*given: Any) -> str:
-        texts.append(write(*given))
-        return texts[-1]
+    def program(text: str, *given: Any, **named: Any) -> Any:
+        made = compiled(text, *given, **named)
+        texts[made.ptx] = text
+        return made
 
     def on_gpu(program: Any, operands: Any, shapes: Any, elements: int) -> list[Any]:
         programs.append(program)
-        made = run_episodes(texts[-1], program, elements, list(map(np.asarray, operands)), shapes)
+        made = run_episodes(texts[program.ptx], program, elements, list(map(np.asarray, operands)), shapes)
         return list(map(jnp.asarray, made))
 
-    monkeypatch.setattr(episode.episode_kernel, "text", text)
+    monkeypatch.setattr(gpu_kernel, "program", program)
     monkeypatch.setattr(episode.calls, "on_gpu", on_gpu)
     monkeypatch.setattr(episode, "processors_and_memory", lambda: (2, 227 * 1024))
     alone = episode.calls.CALL.impl  # the call outside of compiled programs, of a whole batch
@@ -109,6 +109,18 @@ def test_an_episode_is_what_its_steps_are_one_by_one(name: str, on_threads: list
 
 
 @pytest.mark.oldest
+def test_each_acting_warp_serves_several_episodes(on_threads: list[Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(episode, "processors_and_memory", lambda: (1, 227 * 1024))
+    inputs, layers, outputs = SIZES["two of them"]
+    one_by_one, in_kernel = _played(Mlp(layers), inputs, outputs)
+    arguments = _arguments(Mlp(layers), inputs, outputs)
+    wanted, made = one_by_one(*arguments), in_kernel(*arguments)
+    assert [program.elements for program in on_threads] == [8]
+    for a, b in zip(jax.tree.leaves(wanted), jax.tree.leaves(made), strict=True):
+        np.testing.assert_allclose(a, b, atol=2e-5)
+
+
+@pytest.mark.oldest
 def test_a_robots_episode_is_what_its_steps_are_one_by_one(on_threads: list[Any]) -> None:
     task, network, count = SteppingStones(episode_steps=4), Mlp((8,)), 3
     start = jax.vmap(task.reset, (0, None))(jax.random.split(jax.random.key(0), count), jnp.int32(0))
@@ -125,7 +137,7 @@ def test_a_robots_episode_is_what_its_steps_are_one_by_one(on_threads: list[Any]
     assert (np.asarray(made[0].inner.time) == 4).all()
 
 
-def test_trials_on_a_gpu_play_in_one_kernel(tmp_path: Path) -> None:
+def test_trials_on_a_gpu_play_episode_in_one_kernel(tmp_path: Path) -> None:
     inputs, layers, outputs = SIZES["two of them"]
     network = Mlp(layers)
     (ptx,) = kernels_for_gpus(_played(network, inputs, outputs)[1], *_arguments(network, inputs, outputs))
@@ -140,12 +152,49 @@ def test_a_step_that_several_warps_would_share_is_a_kernel_of_its_own(monkeypatc
     assert kernels_for_gpus(_played(network, inputs, outputs)[1], *_arguments(network, inputs, outputs)) == []
 
 
+def test_a_step_that_does_more_than_to_return_a_state_is_played_as_it_is(capfd: pytest.CaptureFixture[str]) -> None:
+    def step(state: Any, action: Any, _: Any) -> Any:
+        jax.debug.print("acts {}", action, ordered=True)
+        return (state[0] + action,)
+
+    def play(state: Any, parameters: Any, constants: Any) -> Any:
+        return step(state, Mlp(()).apply(parameters, state[0], 1), constants)
+
+    kernel = episode_in_one_kernel(play, step, 1, (1, 1), "This episode")
+    made = jax.jit(kernel)((jnp.ones(1),), jnp.zeros(2), ())
+    jax.effects_barrier()
+    assert float(made[0][0]) == 1.0
+    assert "acts [0.]" in capfd.readouterr().out
+
+
+@pytest.mark.parametrize(("observed", "parameters"), [(jnp.float32, jnp.int32), (jnp.int32, jnp.float32)])
+def test_episodes_of_other_numbers_are_played_step_by_step(observed: Any, parameters: Any) -> None:
+    def step(state: Any, action: Any, _: Any) -> Any:
+        return ((state[0] + action).astype(observed),)
+
+    def play(state: Any, parameters: Any, constants: Any) -> Any:
+        return step(state, parameters[:1] * state[0], constants)
+
+    kernel = episode_in_one_kernel(play, step, 1, (1, 1), "This episode")
+    given = (jnp.ones(1, observed),), jnp.ones(2, parameters), ()
+    assert kernels_for_gpus(kernel, *given) == []
+    assert jax.tree.leaves(jax.jit(kernel)(*given))[0] == 2
+
+
 class Slow(SteppingStones):
     """Takes half of what the policy says."""
 
     def step(self, state: Any, action: Any) -> Any:
         """Act."""
         return super().step(state, action / 2)
+
+
+class Loud(Bound):
+    """Says twice what the network does."""
+
+    def __call__(self, observation: Any) -> Any:
+        """Act."""
+        return 2 * super().__call__(observation)
 
 
 class Doubled(Mlp):
@@ -157,10 +206,17 @@ class Doubled(Mlp):
 
 
 def test_tasks_with_steps_of_their_own_and_other_networks_are_played_step_by_step() -> None:
-    cases = (SteppingStones, Mlp((8,)), 1), (Slow, Mlp((8,)), 0), (SteppingStones, Mlp((8,), skip=True), 0)
-    for kind, network, kernels in (*cases, (SteppingStones, Doubled((8,)), 0)):
+    eight = Mlp((8,))
+    cases: list[tuple[Any, Any, Any, int]] = [
+        (SteppingStones, Bound, eight, 1),
+        (Slow, Bound, eight, 0),
+        (SteppingStones, Loud, eight, 0),
+        (SteppingStones, Bound, Mlp((8,), skip=True), 0),
+        (SteppingStones, Bound, Doubled((8,)), 0),
+    ]
+    for kind, bound, network, kernels in cases:
         task = kind(episode_steps=2)
-        policy = Bound(network, jnp.zeros(network.size(task.observation_size, task.action_size)), task.action_size)
+        policy = bound(network, jnp.zeros(network.size(task.observation_size, task.action_size)), task.action_size)
         traced = jax.make_jaxpr(lambda key, task=task, policy=policy: task.episode(policy, key, jnp.int32(0)))
         calls = [e for e in traced(jax.random.key(0)).eqns if e.primitive.name == "kernel"]
         names = [e.params["kernel"].name for e in calls]
@@ -177,4 +233,3 @@ def test_a_block_plays_as_many_episodes_as_use_all_processors_and_as_its_memory_
     ]
     assert episodes_of_a_block(Perceptron((2, 2)), 132 * 32, 132, memory) == 32
     assert episodes_of_a_block(Perceptron((2, 2)), 132 * 32 + 1, 132, memory) == 0
-    assert robot_task.RobotTask.step is SteppingStones.step

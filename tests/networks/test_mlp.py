@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from evoclaims.core.errors import UserError
+from evoclaims.networks.base import Bound
 from evoclaims.networks.mlp import Mlp
 
 SHAPES = [(2, (), 1), (3, (4,), 2), (6, (5, 3, 2), 1), (8, (32, 32, 32, 32), 4)]
@@ -64,3 +65,13 @@ def test_parameters_of_another_network_are_a_sentence_with_both_numbers(extra: i
 def test_an_empty_layer_is_one_sentence() -> None:
     with pytest.raises(UserError, match=r"has layers=\(4, 0\)"):
         Mlp((4, 0))
+
+
+def test_a_network_with_its_parameters_is_a_function_to_jax() -> None:
+    network = Mlp([4])  # type: ignore[arg-type]  # a list of widths is as good
+    assert network == Mlp((4,))
+    parameters = jax.random.normal(jax.random.key(0), (network.size(3, 2),))
+    policy, observation = Bound(network, parameters, 2), jnp.ones(3)
+    wanted = network.apply(parameters, observation, 2)
+    np.testing.assert_allclose(jax.jit(policy)(observation), wanted, rtol=1e-6)
+    np.testing.assert_allclose(jax.lax.cond(True, policy, policy, observation), wanted, rtol=1e-6)

@@ -10,8 +10,9 @@ from jax.errors import JaxRuntimeError
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.methods.neat.evolution import Neat
 from evoclaims.methods.neat.settings import Settings
-from evoclaims.trials.layout import FAST_TO_COMPILE, LOOPS_ON_GPU, SHORT, SIDE_BY_SIDE, Layout
+from evoclaims.trials.layout import BRIEF, FAST_TO_COMPILE, LOOPS_ON_GPU, SHORT, SIDE_BY_SIDE, Layout
 from evoclaims.trials.spec import Budget, Condition
+from reproductions.nisioti2025 import REPRODUCTION
 
 
 def _condition(population: int, generations: int) -> Condition:
@@ -27,9 +28,12 @@ def test_xla_knows_all_options(options: dict[str, object]) -> None:
         lowered.compile({name: "nonsense"})
 
 
-def test_a_gpu_reads_conditions_itself_where_a_step_is_brief_and_kernels_run_together_elsewhere() -> None:
+def test_a_gpu_reads_conditions_itself_where_a_step_of_neat_is_brief_and_kernels_run_together_elsewhere() -> None:
     options = [Layout.VECTOR.options(_condition(population, 1)) for population in (1_024, 1_562, 1_563, 5_000)]
     assert options == [LOOPS_ON_GPU, LOOPS_ON_GPU, SIDE_BY_SIDE, SIDE_BY_SIDE]  # of 64 environment steps each
+    ppo = REPRODUCTION.tiers["full"].conditions["ppo", "n_parity"]
+    assert ppo.cost < BRIEF
+    assert Layout.VECTOR.options(ppo) == SIDE_BY_SIDE  # a step has many loops, and takes 0.6 of the time so
 
 
 def test_a_short_trial_on_a_processor_is_compiled_fast() -> None:

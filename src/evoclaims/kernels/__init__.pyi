@@ -1,5 +1,5 @@
 from evoclaims.kernels.call.by_platform import by_platform as by_platform
-from evoclaims.kernels.call.episode import in_one_kernel as in_one_kernel
+from evoclaims.kernels.call.episode import episode_in_one_kernel as episode_in_one_kernel
 from evoclaims.kernels.call.grouped import GroupKernel as GroupKernel
 from evoclaims.kernels.call.grouped import gpus_run_kernels as gpus_run_kernels
 from evoclaims.kernels.call.kernel import one_kernel as one_kernel

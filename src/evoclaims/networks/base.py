@@ -23,7 +23,7 @@ class Network(Protocol):
         """Map one observation to one output."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)  # so that it has a hash, as functions do, and jax takes it for one
 class Bound:
     """A network with its parameters: a policy.
 

@@ -29,6 +29,7 @@ class Mlp:
 
     def __post_init__(self) -> None:
         """Check the widths."""
+        object.__setattr__(self, "layers", tuple(self.layers))  # a list has no hash
         if any(width < 1 for width in self.layers):
             raise UserError(f"A perceptron has layers={self.layers}. Write at least 1 neuron for each hidden layer.")
 

@@ -10,6 +10,7 @@ from typing import Any, Final
 import jax
 import jax.numpy as jnp
 
+from evoclaims.methods.base import Resizable
 from evoclaims.trials.devices import usable_cores
 from evoclaims.trials.program import Program
 from evoclaims.trials.spec import Condition
@@ -23,7 +24,7 @@ SIDE_BY_SIDE: Final = {"xla_gpu_command_buffer_scheduling_mode": "CONCURRENT"}
 """Small kernels that do not need each other run at the same time: a step of PPO on the gates takes 0.6 of the time."""
 
 BRIEF: Final = 100_000
-"""On a GPU, a method's step of fewer environment steps waits for the host, which reads the conditions of loops."""
+"""On a GPU, a step of NEAT of fewer environment steps waits for the host, which reads the conditions of loops."""
 
 LOOPS_ON_GPU: Final = {
     # XLA's own choice, and the last two
@@ -59,7 +60,7 @@ class Layout(Enum):
     def options(self, condition: Condition) -> dict[str, Any] | None:
         """Return the compiler options; they depend only on condition and layout, so that bits do, too."""
         if not self.alone:
-            brief = condition.cost < BRIEF
+            brief = isinstance(condition.method, Resizable) and condition.cost < BRIEF
             return LOOPS_ON_GPU if brief else SIDE_BY_SIDE
         return FAST_TO_COMPILE if condition.environment_steps <= SHORT else None
 

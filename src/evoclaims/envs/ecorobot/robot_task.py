@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache, partial
-from typing import Any, ClassVar, Final, TypeGuard
+from typing import Any, ClassVar, Final
 
 import jax
 import jax.numpy as jnp
@@ -27,8 +27,8 @@ from evoclaims.envs.ecorobot.pose import Pose, torso
 from evoclaims.envs.ecorobot.robots import SIMPLE_ROB, Robot, fits_as_built_in
 from evoclaims.envs.ecorobot.scene import Places, Scene, scene
 from evoclaims.envs.ecorobot.sensors import Sensor
-from evoclaims.kernels import in_one_kernel, one_kernel
-from evoclaims.networks.base import Bound, Network
+from evoclaims.kernels import episode_in_one_kernel, one_kernel
+from evoclaims.networks.base import Bound
 from evoclaims.networks.mlp import Mlp
 
 
@@ -328,12 +328,14 @@ class RobotTask(ABC):
         return Episode(fitness=total, success=metrics["reached"], metrics=metrics)
 
     def _played(self, policy: PolicyFn, start: TaskState) -> tuple[TaskState, Float[Array, ""]]:
-        """Play from `start`; on a GPU, a perceptron's whole episode is one kernel (`in_one_kernel`)."""
-        if not isinstance(policy, Bound) or not _is_dense(policy.network) or type(self).step is not RobotTask.step:
+        """Play from `start`; on a GPU, a perceptron's whole episode is one kernel (`episode_in_one_kernel`)."""
+        own_steps = type(self).step is not RobotTask.step
+        if own_steps or not isinstance(policy, Bound) or not _is_dense(policy, self.action_size):
             state, total, _ = played(self, policy, start)
         else:
             so_far = (start, jnp.zeros(()), jnp.ones((), bool))
-            play = _episode_kernel(self.with_numbers(None), policy.network)
+            network: Any = policy.network
+            play = _episode_kernel(self.with_numbers(None), network)
             state, total, _ = play(so_far, policy.parameters, self.numbers)
         return state, total
 
@@ -376,14 +378,15 @@ def _step_kernel(task: RobotTask) -> Callable[[TaskState, Array, Places], TaskSt
     )
 
 
-def _is_dense(network: Network) -> TypeGuard[Mlp]:
-    """Whether a network computes what the kernel of episodes does; one that is built on `Mlp` may compute otherwise."""
-    return type(network) is Mlp and not network.skip
+def _is_dense(policy: Bound, outputs: int) -> bool:
+    """Whether a policy computes what the kernel of episodes does; what is built on these classes may not."""
+    network = policy.network
+    return type(policy) is Bound and type(network) is Mlp and not network.skip and policy.outputs == outputs
 
 
 @lru_cache(maxsize=64)
 def _episode_kernel(task: RobotTask, network: Mlp) -> Callable[[Played, Array, Places], Played]:
-    """Return an episode of a perceptron, with its parameters and the boxes' places as arguments."""
+    """Return an episode of an `Mlp`, with its parameters and the boxes' places as arguments."""
 
     def play(so_far: Played, parameters: Array, places: Places) -> Played:
         return played_on(task.with_numbers(places), Bound(network, parameters, task.action_size), so_far)[0]
@@ -392,4 +395,4 @@ def _episode_kernel(task: RobotTask, network: Mlp) -> Callable[[Played, Array, P
         return counted(before, task.with_numbers(places).plain_step(before[0], action))
 
     widths = (task.observation_size, *network.layers, task.action_size)
-    return in_one_kernel(play, step, task.horizon, widths, f"An episode of {task.name}")
+    return episode_in_one_kernel(play, step, task.horizon, widths, f"An episode of {task.name}")

@@ -13,17 +13,17 @@ from jaxtyping import Array
 
 from evoclaims.kernels.call import calls
 from evoclaims.kernels.call.kernel import Kernel, Shapes
-from evoclaims.kernels.emit import episode_kernel, gpu_kernel
+from evoclaims.kernels.emit import episode_kernel, gpu_kernel, llvm_ir, machine_code
 from evoclaims.kernels.emit.block_kernel import processors_and_memory
 from evoclaims.kernels.emit.episode_kernel import Perceptron, Play
 from evoclaims.kernels.emit.llvm_ir import BYTES, ArrayRow
-from evoclaims.kernels.trace.expressions import Input, everything
+from evoclaims.kernels.trace.expressions import Input, Unsupported, everything
 from evoclaims.kernels.trace.interpreter import Numbers
 from evoclaims.kernels.trace.scalarize import scalarize
 
 
 class EpisodeKernel(Kernel):
-    """What `in_one_kernel` returns, for arguments of given shapes."""
+    """What `episode_in_one_kernel` returns, for arguments of given shapes."""
 
     def __init__(
         self,
@@ -55,9 +55,22 @@ class EpisodeKernel(Kernel):
         return {i: ArrayRow(math.prod(self.shapes[i].shape), self.shapes[i].dtype.kind) for i in sorted(used)}
 
     @cached_property
-    def _is_small(self) -> bool:
-        """Whether a warp alone computes a step as fast as several would."""
-        return len(everything(number for result in self.results for number in result.flat)) <= gpu_kernel.SMALL
+    def supported(self) -> bool:
+        """Whether steps can be a part of the kernel. Where not, the step's own kernel is better, or says why."""
+        try:
+            machine_code.lanes()
+            numbers = [number for result in self.results for number in result.flat]
+            llvm_ir.check(numbers)
+        except Unsupported:
+            return False
+        floats = self.shapes[0].dtype == self.shapes[len(self.results)].dtype == jnp.float32
+        # A warp alone computes a small step as fast as several would.
+        return floats and self._steps > 0 and len(everything(numbers)) <= gpu_kernel.SMALL
+
+    @property
+    def has_effects(self) -> bool:
+        """Whether playing does more than to return a state, such as printing: the kernel's call would not say so."""
+        return bool(self._traced.effects)
 
     def on_host(self, *leaves: Array) -> list[Array]:
         """Play as `play` says."""
@@ -66,7 +79,7 @@ class EpisodeKernel(Kernel):
     def on_gpu(self, *leaves: Array) -> list[Array]:
         """Play in the kernel, or as `play` says where it cannot be had, or would be slower."""
         rows = math.prod(self.batch(leaves))
-        if not rows or not self._together(rows) or not self.supported or not self._is_small:
+        if not rows or not self._together(rows) or not self.supported:
             return self.as_it_is(*leaves)
         return super().on_gpu(*leaves)
 
@@ -82,10 +95,13 @@ class EpisodeKernel(Kernel):
         return gpu_kernel.program(text, self.name, together, episode_kernel.warps_for(together), shared_bytes=memory)
 
 
-def in_one_kernel(
+def episode_in_one_kernel(
     play: Callable[..., Any], step: Callable[..., Any], steps: int, widths: Sequence[int], name: str
 ) -> Callable[..., Any]:
-    """Return `play`, run as one kernel on NVIDIA's GPUs where a step is small and a block has room for enough episodes.
+    """Return `play`, run as one kernel on NVIDIA's GPUs where a step is small and all episodes fit at a time.
+
+    All processors play together, as many episodes each as have room for their perceptrons: about a thousand of the
+    paper's on an H200. More are played step by step.
 
     Args:
         play: from a state, a tree of arrays the first of which a perceptron sees, from the perceptron's parameters, and
@@ -105,6 +121,8 @@ def in_one_kernel(
         leaves, treedef = jax.tree.flatten((state, parameters, constants))
         leaves = [jnp.asarray(leaf) for leaf in leaves]
         made = kernel(treedef, tuple(jax.ShapeDtypeStruct(leaf.shape, leaf.dtype) for leaf in leaves))
+        if made.has_effects:
+            return play(state, parameters, constants)
         return jax.tree.unflatten(made.structure, calls.CALL.bind(*leaves, kernel=made))
 
     return run

@@ -63,7 +63,7 @@ class Layer:
     @property
     def end(self) -> int:
         """Where the next layer's weights begin there."""
-        return self.biases + _whole(self.width, QUAD)
+        return self.biases + _rounded_up(self.width, QUAD)
 
 
 @dataclass(frozen=True)
@@ -92,14 +92,14 @@ class Perceptron:
         return sum((layer.inputs + 1) * layer.width for layer in self.layers)
 
     @property
-    def signal(self) -> int:
-        """Room in the block's memory for what a layer gets or makes."""
-        return _whole(max(self.widths), BLOCK)
+    def room(self) -> int:
+        """Words of the block's memory for what a layer gets or makes."""
+        return _rounded_up(max(self.widths), BLOCK)
 
     @property
     def words(self) -> int:
         """The block's memory for one episode: parameters, what is observed, and what layers make in turns."""
-        return self.layers[-1].end + 3 * self.signal
+        return self.layers[-1].end + 3 * self.room
 
 
 @dataclass(frozen=True)
@@ -107,14 +107,14 @@ class Play:
     """An episode.
 
     Attributes:
-        rounds: steps.
+        steps: how many.
         state: the expressions of the state after a step, array by array. Their first inputs are the arrays of the state
             before, then comes the action, and then what no step changes.
         network: the perceptron, which sees the first array. Its parameters are the kernel's argument in place of the
             action.
     """
 
-    rounds: int
+    steps: int
     state: Sequence[Numbers]
     network: Perceptron
 
@@ -247,7 +247,7 @@ class _Block:
             return [page.operand(number, made) for number in after]
 
         types = [TYPES[number.dtype.kind] for number in before]
-        registers = page.repeat("{}.step", play.rounds, types, [element.load(number) for number in before], round_)
+        registers = page.repeat("{}.step", play.steps, types, [element.load(number) for number in before], round_)
         page.write(f"br i1 {inside}, label %store, label %done")
         page.label("store")
         element.forget()
@@ -272,7 +272,7 @@ class _Block:
             self.wait()
             return []
 
-        page.repeat("{}.act", self._play.rounds, [], [], round_)
+        page.repeat("{}.act", self._play.steps, [], [], round_)
         page.write("br label %done")
 
     def _dense(self, layer: Layer, words: str, given: str, made: str) -> None:
@@ -319,7 +319,7 @@ class _Block:
         That has a place of its own: a lane may write it again while another still reads the action.
         """
         place = 2 - depth % 2 if depth else 0
-        return self._word(words, str(self._layers[-1].end + place * self._network.signal))
+        return self._word(words, str(self._layers[-1].end + place * self._network.room))
 
     def _get(self, address: str, place: str) -> str:
         return self._page.put(f"load float, ptr addrspace(3) {self._word(address, place)}, align {BYTES['f']}")
@@ -346,5 +346,5 @@ class _Block:
         self._page.call("llvm.nvvm.barrier0", "void", [])
 
 
-def _whole(count: int, of: int) -> int:
+def _rounded_up(count: int, of: int) -> int:
     return -(-count // of) * of

@@ -1,4 +1,4 @@
-"""Instructions for NVIDIA's GPUs, with quotients and square roots that have no branches.
+"""Instructions for NVIDIA's GPUs, with quotients and square roots that have no branches, unless they shall.
 
 NVIDIA's assembler makes a branch and a call of an exactly rounded division or root, and moves nothing across them. Here
 both are made of a GPU's approximation and of remainders, which a fused multiply-add computes exactly (P. Markstein,
@@ -113,7 +113,7 @@ class GpuInstructions(Instructions):
         return self._product(root, self._either(small, SHRUNK, np.float32(1)))
 
     def in_any_lane(self, condition: str) -> str:
-        """Return whether a condition is true in any thread of the warp: else it would go both ways, one by one."""
+        """Return whether a condition is true in any thread of the warp, which would else execute both ways in turn."""
         return self.call("llvm.nvvm.vote.any.sync", "i1", [("i32", "-1"), ("i1", condition)])
 
     def _either(self, condition: str, yes: Number, no: Number) -> str:

@@ -75,8 +75,8 @@ class _Pair:
     ) -> None:
         """Find the leaves; `slots` is room for the centre's slot of each node."""
         self.of, self.page, self.slots = of, page, slots
-        genes = [1] * 9 if of.by_gene else [*[of.nodes] * 4, *[of.connections] * 3, 1, 1]
-        self.own = self._rows(groups[:9], genome, genes)
+        sizes = [1] * 9 if of.by_gene else [*[of.nodes] * 4, *[of.connections] * 3, 1, 1]
+        self.own = self._rows(groups[:9], genome, sizes)
         self.centre = self._rows(groups[9:16], place, [of.keys, *[of.nodes] * 3, of.nodes**2, 1, 1])
 
     def distance(self) -> str:
