@@ -76,8 +76,8 @@ ROBOT_PACKAGES: Final = ("llvmlite", "mujoco", "mujoco-mjx")
 class RobotTask(ABC):
     """A task with one level. A subclass defines name, boxes and `rule`, and if needed `memory` and `measures`.
 
-    Fields must be hashable, and the fields that `rule`, `memory` and `shown` read must be compared: equal tasks share
-    their kernels.
+    Fields must be hashable, and those that `rule`, `memory`, `shown`, `observation_size` and `horizon` read must be
+    compared: equal tasks share their kernels.
 
     Attributes:
         robot: who acts.

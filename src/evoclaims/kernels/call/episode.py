@@ -34,18 +34,18 @@ class EpisodeKernel(Kernel):
         name: str,
         given: Any,
     ) -> None:
-        """Trace both; `given` are the shapes of the arguments."""
-        state, parameters, constants = given
+        """Trace `play`; `given` are the shapes of the arguments."""
         leaves, treedef = jax.tree.flatten(given)
         super().__init__(play, name, treedef, tuple(leaves))
-        action = jax.ShapeDtypeStruct(widths[-1:], parameters.dtype)
-        self._stepped = jax.make_jaxpr(step)(state, action, constants)
+        self._step, self._given = step, given
         self._steps, self._network = steps, Perceptron(widths)
 
     @cached_property
     def results(self) -> list[Numbers]:
-        """The expressions of the numbers of the state after a step."""
-        return scalarize(self._stepped)
+        """The expressions of the numbers of the state after a step, which only a GPU needs."""
+        state, parameters, constants = self._given
+        action = jax.ShapeDtypeStruct(self._network.widths[-1:], parameters.dtype)
+        return scalarize(jax.make_jaxpr(self._step)(state, action, constants))
 
     @cached_property
     def read(self) -> dict[int, ArrayRow]:
