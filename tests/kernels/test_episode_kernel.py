@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -19,8 +20,10 @@ from evoclaims.kernels import episode_in_one_kernel
 from evoclaims.kernels.call import episode
 from evoclaims.kernels.emit import gpu_kernel
 from evoclaims.kernels.emit.episode_kernel import Perceptron, episodes_of_a_block
+from evoclaims.methods.flat_champion import policy_of
 from evoclaims.networks.base import Bound
 from evoclaims.networks.mlp import Mlp
+from reproductions.nisioti2025 import REPRODUCTION
 
 STEPS = 5
 TRIALS, POPULATION = 2, 3
@@ -143,6 +146,23 @@ def test_trials_on_a_gpu_play_episode_in_one_kernel(tmp_path: Path) -> None:
     (ptx,) = kernels_for_gpus(_played(network, inputs, outputs)[1], *_arguments(network, inputs, outputs))
     assert ".entry this_episode(" in ptx
     assemble(ptx, tmp_path)
+
+
+def test_the_papers_map_elites_plays_in_one_kernel_on_an_h200(monkeypatch: pytest.MonkeyPatch) -> None:
+    condition = REPRODUCTION.tiers["full"].conditions["map_elites", "stones"]
+    method, task = condition.method, condition.task
+    monkeypatch.setattr(episode, "processors_and_memory", lambda: (132, 227 * 1024))
+
+    def fitness(vector: Any, key: Any) -> Any:
+        return task.episode(policy_of(method.network, task, vector), key, jnp.int32(0)).fitness
+
+    vectors = jnp.zeros((10, method.batch, method.network.size(task.observation_size, task.action_size)))
+    keys = jax.random.split(jax.random.key(0), (10, method.batch))
+    texts = kernels_for_gpus(jax.vmap(jax.vmap(fitness)), vectors, keys)
+    assert [name for text in texts for name in re.findall(r"\.entry (\w+)\(", text)] == [
+        "a_start_of_stepping_stones",
+        "an_episode_of_stepping_stones",
+    ]
 
 
 def test_a_step_that_several_warps_would_share_is_a_kernel_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
