@@ -1,7 +1,7 @@
 """Runs the text of a GPU's kernel on this processor: threads that wait for each other are threads, with real barriers.
 
 Where warps share the work a lane is run at a time, a thread for each warp; where threads compute an element's parts, an
-element at a time.
+element at a time; where a block plays episodes, a block.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import ctypes
 import re
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -38,12 +38,7 @@ def run(
         arrays: those that it reads.
         results: shapes of what it computes.
     """
-    code = machine_code.address(_for_this_processor(text), ENTRY)
-    read = [np.ascontiguousarray(a) for a in arrays]
-    made = [np.full(r.shape, 77, r.dtype) for r in results]
-    addresses = [ctypes.c_void_p(a.ctypes.data) for a in (*read, *made)]
-    types = [*[ctypes.c_void_p] * (len(addresses) + 1), *[ctypes.c_int32] * 4, CALLED, ASKED]
-    kernel = ctypes.CFUNCTYPE(None, *types)(code)
+    kernel, made = _compiled(_for_this_processor(text), arrays, results)
     for first in range(0, rows, BLOCK * shape.teams):
         for lane in range(BLOCK):
             memory = np.full(shape.shared_bytes // 4, NOT_A_NUMBER, np.int32)
@@ -52,12 +47,8 @@ def run(
             anyone = ASKED(partial(_anyone, barrier, {}))
             block = first // (BLOCK * shape.teams)
             places = [(block, lane, warp, team) for warp in range(shape.warps) for team in range(shape.teams)]
-            given = [(*addresses, memory.ctypes.data, *place, wait, anyone) for place in places]
-            threads = [threading.Thread(target=kernel, args=arguments) for arguments in given]
-            for thread in threads:
-                thread.start()
-            for thread in threads:
-                thread.join()
+            given = [(memory.ctypes.data, *place, wait, anyone) for place in places]
+            _at_once(kernel, given)
             of_others = np.delete(memory.reshape(-1, BLOCK), lane, axis=1)
             assert (of_others == NOT_A_NUMBER).all(), "a lane wrote into another's words"
     return made
@@ -77,12 +68,7 @@ def run_parts(text: str, parts: int, rows: int, arrays: Sequence[Any], results: 
         called = rf"\1.in = bitcast float \2 to i32\n\1.out = call i32 %{mode}(i32 \1.in, \3)"
         text = re.sub(call, rf"{called}\n\1 = bitcast i32 \1.out to float", text)
     text = _for_this_processor(text).replace("ptr %anyone)", "ptr %anyone, ptr %idx, ptr %bfly)")
-    code = machine_code.address(text, ENTRY)
-    read = [np.ascontiguousarray(a) for a in arrays]
-    made = [np.full(r.shape, 77, r.dtype) for r in results]
-    addresses = [ctypes.c_void_p(a.ctypes.data) for a in (*read, *made)]
-    types = [*[ctypes.c_void_p] * (len(addresses) + 1), *[ctypes.c_int32] * 4, CALLED, ASKED, SHUFFLED, SHUFFLED]
-    kernel = ctypes.CFUNCTYPE(None, *types)(code)
+    kernel, made = _compiled(text, arrays, results, SHUFFLED, SHUFFLED)
     for element in range(-(-rows * parts // BLOCK) * BLOCK // parts):  # those of the last block compute the last one
         barrier, numbers, votes = threading.Barrier(parts), [0] * parts, dict[int, int]()
 
@@ -94,19 +80,15 @@ def run_parts(text: str, parts: int, rows: int, arrays: Sequence[Any], results: 
             return shuffled
 
         anyone, nothing = ASKED(partial(_anyone, barrier, votes)), CALLED(lambda: None)
-        threads = []
+        given = []
         for part in range(parts):
             asked = (
                 SHUFFLED(partial(shuffle, part)),
                 SHUFFLED(lambda number, bit, part=part, shuffle=shuffle: shuffle(part, number, part ^ bit)),
             )
             block, lane = divmod(element * parts + part, BLOCK)
-            given = (*addresses, 0, block, lane, 0, 0, nothing, anyone, *asked)
-            threads.append(threading.Thread(target=kernel, args=given))
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
+            given.append((0, block, lane, 0, 0, nothing, anyone, *asked))
+        _at_once(kernel, given)
     return made
 
 
@@ -114,25 +96,41 @@ def run_episodes(text: str, program: GpuProgram, rows: int, arrays: Sequence[Any
     """Return the results of a kernel of `episode_kernel`, a block at a time; for the rest see `run`."""
     text = text.replace("call void @llvm.nvvm.bar.warp.sync(i32 -1)", "call void %warp_waits()")
     text = _for_this_processor(text).replace("ptr %anyone)", "ptr %anyone, ptr %warp_waits)")
-    code = machine_code.address(text, ENTRY)
-    read = [np.ascontiguousarray(a) for a in arrays]
-    made = [np.full(r.shape, 77, r.dtype) for r in results]
-    addresses = [ctypes.c_void_p(a.ctypes.data) for a in (*read, *made)]
-    types = [*[ctypes.c_void_p] * (len(addresses) + 1), *[ctypes.c_int32] * 4, CALLED, ASKED, CALLED]
-    kernel = ctypes.CFUNCTYPE(None, *types)(code)
+    kernel, made = _compiled(text, arrays, results, CALLED)
     nobody = ASKED(lambda _: 0)
     for block in range(-(-rows // program.elements)):
         memory = np.full(program.shared_bytes // 4, NOT_A_NUMBER, np.int32)
         barriers = [threading.Barrier(BLOCK * program.warps), *(threading.Barrier(BLOCK) for _ in range(program.warps))]
         wait, *of_warps = [CALLED(lambda barrier=barrier: barrier.wait(60) and None) for barrier in barriers]
         places = [(block, lane, warp, 0) for warp in range(program.warps) for lane in range(BLOCK)]
-        given = [(*addresses, memory.ctypes.data, *place, wait, nobody, of_warps[place[2]]) for place in places]
-        threads = [threading.Thread(target=kernel, args=arguments) for arguments in given]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
+        given = [(memory.ctypes.data, *place, wait, nobody, of_warps[place[2]]) for place in places]
+        _at_once(kernel, given)
     return made
+
+
+def _compiled(
+    text: str, arrays: Sequence[Any], results: Sequence[Any], *more: Any
+) -> tuple[Callable[..., None], list[Any]]:
+    """Return a kernel that takes what follows its arrays (`more` are types), and where its results will be."""
+    read = [np.ascontiguousarray(a) for a in arrays]
+    made = [np.full(r.shape, 77, r.dtype) for r in results]
+    addresses = [ctypes.c_void_p(a.ctypes.data) for a in (*read, *made)]
+    types = [*[ctypes.c_void_p] * (len(addresses) + 1), *[ctypes.c_int32] * 4, CALLED, ASKED, *more]
+    kernel = ctypes.CFUNCTYPE(None, *types)(machine_code.address(text, ENTRY))
+
+    def call(*given: Any, arrays: Any = read) -> None:  # they must live as long as the kernel
+        kernel(*addresses, *given)
+
+    return call, made
+
+
+def _at_once(kernel: Callable[..., None], given: Sequence[Sequence[Any]]) -> None:
+    """Call a kernel with each of the arguments, all at once."""
+    threads = [threading.Thread(target=kernel, args=arguments) for arguments in given]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
 
 
 def _anyone(barrier: threading.Barrier, votes: dict[int, int], vote: int) -> int:

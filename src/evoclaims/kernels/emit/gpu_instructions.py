@@ -1,4 +1,4 @@
-"""Instructions for NVIDIA's GPUs, with quotients and square roots that have no branches, unless they shall.
+"""Instructions for NVIDIA's GPUs, with quotients and square roots that have no branches, except in the longest kernels.
 
 NVIDIA's assembler makes a branch and a call of an exactly rounded division or root, and moves nothing across them. Here
 both are made of a GPU's approximation and of remainders, which a fused multiply-add computes exactly (P. Markstein,
