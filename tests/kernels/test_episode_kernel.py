@@ -57,14 +57,15 @@ def _played(network: Mlp, inputs: int, outputs: int) -> tuple[Callable[..., Any]
     return one, other
 
 
-def _arguments(network: Mlp, inputs: int, outputs: int) -> Any:
+def _arguments(network: Mlp, inputs: int, outputs: int, second_bound: float = 0.5) -> Any:
+    """Draw arguments; the second trial's episodes end beyond a bound, and the first one's do not."""
     rng = np.random.default_rng(0)
 
     def numbers(*shape: int) -> Any:
         return jnp.asarray(rng.normal(size=(TRIALS, POPULATION, *shape)), jnp.float32)
 
     state = numbers(inputs), jnp.ones((TRIALS, POPULATION), jnp.int32), numbers() < 2, numbers(0)
-    constants = {"bound": jnp.array([[0.0, 100.0], [0.0, 0.5]]), "gain": jnp.float32(0.3)}
+    constants = {"bound": jnp.array([[0.0, 100.0], [0.0, second_bound]]), "gain": jnp.float32(0.3)}
     return state, numbers(network.size(inputs, outputs)), constants
 
 
@@ -116,9 +117,10 @@ def test_each_acting_warp_serves_several_episodes(on_threads: list[Any], monkeyp
     monkeypatch.setattr(episode, "processors_and_memory", lambda: (1, 227 * 1024))
     inputs, layers, outputs = SIZES["two of them"]
     one_by_one, in_kernel = _played(Mlp(layers), inputs, outputs)
-    arguments = _arguments(Mlp(layers), inputs, outputs)
+    arguments = _arguments(Mlp(layers), inputs, outputs, second_bound=100.0)
     wanted, made = one_by_one(*arguments), in_kernel(*arguments)
     assert [program.elements for program in on_threads] == [8]
+    assert np.asarray(made[2])[1].any()  # its episodes, the fifth and the sixth among them, go on
     for a, b in zip(jax.tree.leaves(wanted), jax.tree.leaves(made), strict=True):
         np.testing.assert_allclose(a, b, atol=2e-5)
 
