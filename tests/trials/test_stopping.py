@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import importlib
 import os
+import queue
 import signal
 import sys
+import threading
 import time
 from collections import Counter
 from pathlib import Path
@@ -18,7 +20,7 @@ from evoclaims.trials import checkpoint, stopping
 from evoclaims.trials.progress import RunProgress
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.runner import run
-from evoclaims.trials.stopping import interrupted_by
+from evoclaims.trials.stopping import interrupted_by, next_of
 from evoclaims.trials.store import Store
 
 NEVER = 1e9
@@ -64,6 +66,24 @@ def test_an_ignored_signal_stays_ignored() -> None:
             os.kill(os.getpid(), signal.SIGTERM)
     finally:
         signal.signal(signal.SIGTERM, before)
+
+
+def test_an_interrupt_that_another_thread_receives_ends_the_wait_for_an_item() -> None:
+    """So does one that comes just before the wait: neither wakes a lock."""
+    items: queue.SimpleQueue[None] = queue.SimpleQueue()
+    late = threading.Event()
+
+    def receive() -> None:
+        time.sleep(0.1)
+        signal.pthread_kill(threading.get_ident(), signal.SIGINT)
+        time.sleep(20.0)
+        late.set()
+        items.put(None)
+
+    threading.Thread(target=receive, daemon=True).start()
+    with pytest.raises(KeyboardInterrupt), interrupted_by(signal.SIGINT):
+        next_of(items)
+    assert not late.is_set()
 
 
 def test_an_interrupt_comes_after_what_would_lose_it() -> None:

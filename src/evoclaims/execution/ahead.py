@@ -19,6 +19,7 @@ from evoclaims.trials import devices
 from evoclaims.trials.batches import StoredTrials
 from evoclaims.trials.failed import remember
 from evoclaims.trials.spec import Condition
+from evoclaims.trials.stopping import LOOK_SECONDS
 from evoclaims.trials.store import Store
 
 
@@ -114,7 +115,8 @@ class Ahead:
             UserError: when they cannot be run.
         """
         if condition.id in self._ended:
-            self._ended[condition.id].wait()
+            while not self._ended[condition.id].wait(LOOK_SECONDS):  # see `next_of`
+                pass
         if self._broken is not None:
             raise self._broken
         stored = StoredTrials(self.store, condition, self.order.any_version, self.limit)

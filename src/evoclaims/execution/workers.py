@@ -22,6 +22,7 @@ from evoclaims.execution.job import Job, MissingBatch, sharing_programs
 from evoclaims.execution.worker import USER_ERROR, Ended, Reply, Told, WorkOrder
 from evoclaims.paper.reproduction import Conditions
 from evoclaims.trials import devices
+from evoclaims.trials.stopping import next_of
 
 
 class Process:
@@ -187,7 +188,7 @@ class Workers:
         try:
             self._sit(self._seats)
             while expected:
-                ended = self._ended.get()
+                ended = next_of(self._ended)
                 if isinstance(ended, BaseException):
                     raise ended
                 expected.discard(ended.job)

@@ -46,7 +46,7 @@ from evoclaims.trials.progress import RunProgress, Watcher
 from evoclaims.trials.result import RETURNED, TRAINED_BY, Status, TrialResult
 from evoclaims.trials.result_making import make_record, make_unfinished
 from evoclaims.trials.spec import TrialSpec
-from evoclaims.trials.stopping import Allowance, OutOfTimeError
+from evoclaims.trials.stopping import Allowance, OutOfTimeError, next_of
 
 _READ: Final = 4000
 _KEPT: Final = 2**16
@@ -261,7 +261,7 @@ class LoopTrials:
                 for one in running:
                     pool.submit(self._attend, one)
                 while len(stored) < len(running):
-                    heard = self._events.get()
+                    heard = next_of(self._events)
                     if isinstance(heard, BaseException):
                         raise heard
                     if heard.outcome and heard.spec.seed not in stored:

@@ -10,6 +10,7 @@ import _thread
 import contextlib
 import math
 import os
+import queue
 import signal
 import sys
 import threading
@@ -125,6 +126,17 @@ _working: weakref.WeakSet[Future[Any]] = weakref.WeakSet()
 
 Threads are not asked: before Python 3.13 a thread whose `join` was interrupted says that it has ended, and it has not.
 """
+
+
+def next_of(events: queue.SimpleQueue[T]) -> T:
+    """Wait for the next item of a queue, and hear a signal meanwhile.
+
+    One that comes in the microseconds before a wait for a lock, or that the system gives to another thread, does not
+    end that wait: it must end by itself now and then.
+    """
+    while True:
+        with contextlib.suppress(queue.Empty):
+            return events.get(timeout=LOOK_SECONDS)
 
 
 class OutOfTimeError(Exception):
