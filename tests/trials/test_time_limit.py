@@ -271,16 +271,21 @@ def test_only_a_trial_that_ran_out_of_as_much_time_must_not_be_run(make_result: 
     assert [answers(late, limit) for limit in (59.0, 60.0, 61.0, math.inf)] == [True, True, False, False]
 
 
-def test_an_interrupt_waits_for_the_work_that_is_under_way() -> None:
+@pytest.mark.parametrize(("more", "says"), [(0.2, ""), (0.5, f"{allowances.WAITS}\n")])
+def test_an_interrupt_waits_for_the_work_that_is_under_way_and_says_so(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], more: float, says: str
+) -> None:
     """A real one: what Python makes of it in the waiting thread differs between its versions."""
+    monkeypatch.setattr(allowances, "LOOK_SECONDS", 0.1 if says else 30.0)
     done: list[bool] = []
 
     def work() -> None:
         pause = threading.Event()
         pause.wait(0.2)
         signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
-        done.append(pause.wait(0.2))
+        done.append(pause.wait(more))
 
     with pytest.raises(KeyboardInterrupt):
         Allowance(600.0).spend(work)
     assert done
+    assert capsys.readouterr().err == says

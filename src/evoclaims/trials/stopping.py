@@ -121,6 +121,9 @@ LOOK_SECONDS: Final = 1.0
 """Time between two looks at the clock; more than twice this is not counted: the process was stopped. Nor is it counted
 when the process waits for another one that compiles the same kernel."""
 
+WAITS: Final = "\nevoclaims: interrupted; waiting for what is being computed. Ctrl-C again ends at once."
+"""What is said to the user where this takes longer than a look."""
+
 _working: weakref.WeakSet[Future[Any]] = weakref.WeakSet()
 """What all threads make; known before they start, since several interrupts may come at any time.
 
@@ -173,6 +176,10 @@ class Allowance:
         try:
             self._wait(made)
         except BaseException:  # on an interrupt, wait for the work, as on this thread; a second one ends the wait
+            wait([made], min(LOOK_SECONDS, self.left))
+            if not made.done():
+                with contextlib.suppress(Exception):  # a full disk, a reader that is gone
+                    print(WAITS, file=sys.stderr, flush=True)
             self._wait(made)
             raise
         if not made.done():
