@@ -165,7 +165,7 @@ def _hash(code: Any, parts: frozenset[type]) -> str:
         # The syntax tree and not the text, so that a comment or a new layout does not look like an edit.
         found[name] = _as_lists(tree)
         if not (dataclasses.is_dataclass(one) and any(one in part.__mro__ for part in parts)):
-            objects |= {f"{name}.{word}": default for word, default in _defaults(one)}
+            objects |= {f"{name}.{word}": default for word, default in _defaults(one).items()}
         held += one.__bases__ if inspect.isclass(one) else ()
         for word, value, variable in _named(tree, module):
             if _is_constant(value):
@@ -329,13 +329,13 @@ def _parsed(one: Any) -> ast.Module:
         return ast.Module([], [])
 
 
+@cache
 def _tree(one: Any) -> ast.Module:
-    """Return the code of a class or function without what does not count."""
+    """Return the code of a class or function without what does not count; nobody may change it."""
     tree = _without_words(_parsed(one))
     for node in ast.walk(tree):
-        if isinstance(node, ast.ClassDef):
-            for statement in _held_by_ids(node):
-                statement.value = None
+        for statement in _held_by_ids(node):
+            statement.value = None
     return tree
 
 
@@ -348,19 +348,19 @@ def _without_words(tree: ast.Module) -> ast.Module:
     return tree
 
 
-def _defaults(one: Any) -> Iterator[tuple[str, Any]]:
-    """Yield the names and defaults of a class's fields, which ids hold only if it is a component's."""
-    classes = [node for node in _parsed(one).body if isinstance(node, ast.ClassDef)]
-    for statement in (statement for node in classes for statement in _held_by_ids(node) if statement.value):
-        word = ast.unparse(statement.target)
-        value = vars(one).get(word, ast)  # a module, which is no constant
-        if word not in _IN_THE_ID:
-            yield word, repr(value) if _is_constant(value) else _as_lists(statement.value)
+@cache
+def _defaults(one: Any) -> Mapping[str, Any]:
+    """Return the defaults of a class's fields by name, which ids hold only if it is a component's."""
+    fields = [each for node in _parsed(one).body for each in _held_by_ids(node) if each.value]
+    made = {word: each.value for each in fields if (word := ast.unparse(each.target)) not in _IN_THE_ID}
+    values = {word: vars(one).get(word, ast) for word in made}  # a module is no constant
+    return {word: repr(now) if _is_constant(now := values[word]) else _as_lists(made[word]) for word in made}
 
 
-def _held_by_ids(node: ast.ClassDef) -> list[ast.AnnAssign]:
-    """Return the fields of a component's class, and the class variables that ids or versions hold."""
-    return [each for each in node.body if isinstance(each, ast.AnnAssign) and _is_in_the_id(each)]
+def _held_by_ids(node: ast.AST) -> list[ast.AnnAssign]:
+    """Return a component's fields, and the class variables that ids or versions hold; none of what is no class."""
+    body = node.body if isinstance(node, ast.ClassDef) else ()
+    return [each for each in body if isinstance(each, ast.AnnAssign) and _is_in_the_id(each)]
 
 
 def _as_lists(node: Any) -> Any:
