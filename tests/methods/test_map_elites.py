@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -286,6 +286,33 @@ def test_drawn_networks_have_lecuns_weights_and_no_biases(skip: bool) -> None:
         np.testing.assert_allclose(drawn[:, start:].std(axis=0), 10**-0.5, rtol=0.08)
     else:
         assert start == drawn.shape[1]
+
+
+class _Moved(Plane):
+    """A plane of two levels: success is to end at the left on the first, and nowhere on the second."""
+
+    levels: ClassVar[int] = 2
+
+    def episode(self, policy: Any, key: Any, level: Any) -> Episode:
+        one = super().episode(policy, key, level)
+        return replace(
+            one, fitness=one.fitness - jnp.where(level == 0, 0.0, 10.0), success=jnp.where(level == 0, 1.0, 0.0)
+        )
+
+
+def test_nothing_of_another_level_is_told_or_kept() -> None:
+    """The archive held elites of the level before, whose success was told as that of this one: it counted as solved."""
+    bench = Workbench(SMALL, _Moved())
+    state, (*_, first) = bench.run(4)
+    assert (float(first.success), int(state.level)) == (1.0, 0)
+    after, (second,) = bench.run(1, state=state, level=1)
+    assert (float(second.success), int(after.level)) == (0.0, 1)
+    assert float(second.fitness) < -5.0
+    held = np.asarray(after.archive.fitnesses)
+    assert np.isfinite(held).any()
+    assert (held < -5.0).all()
+    assert bench.run(2, state=after, level=1)[1][-1].metrics["elites"] >= second.metrics["elites"]
+    assert Workbench(SMALL, Plane()).init().level is None
 
 
 class _Blind(Plane):

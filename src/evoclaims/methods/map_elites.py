@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Protocol, runtime_checkable
@@ -52,11 +52,13 @@ class MapElitesState:
             descriptors [cells, 2] in metres, and each elite's success [cells].
         evaluated: individuals evaluated so far.
         reached: 1 once any individual has reached the task's target, else 0.
+        level: of the elites; None where the task has one level.
     """
 
     archive: Any
     evaluated: Int[Array, ""]
     reached: Float[Array, ""]
+    level: Int[Array, ""] | None = None
 
 
 _LOWEST: Final = float(np.finfo(np.float32).min)
@@ -68,7 +70,8 @@ class MapElites:
 
     The descriptor is where the episode ended, on a euclidean grid over the task's area. The first batches are drawn as
     in QDax's examples: LeCun-uniform weights, zero biases. An individual that is not finite or ends outside the area
-    counts as evaluated, but is dropped. Elites keep the fitness of the level they were evaluated on.
+    counts as evaluated, but is dropped. Where the level has changed, the map is emptied, since its fitnesses are of
+    another level; the first to enter it again are the old elites' children.
 
     Attributes:
         network: the policy's network, whose weights and biases are evolved.
@@ -121,7 +124,10 @@ class MapElites:
                 keys_extra_scores=("success",),
             )
         return MapElitesState(
-            archive=strong(archive), evaluated=jnp.zeros((), jnp.int32), reached=jnp.zeros((), jnp.float32)
+            archive=strong(archive),
+            evaluated=jnp.zeros((), jnp.int32),
+            reached=jnp.zeros((), jnp.float32),
+            level=jnp.zeros((), jnp.int32) if task.levels > 1 else None,
         )
 
     def step(
@@ -139,7 +145,8 @@ class MapElites:
         draw_key, vary_key, episode_key = streams(key, "draw", "vary", "episode")
         drawn = lecun_uniform(draw_key, self.network, task.observation_size, task.action_size, self.batch)
         population = jnp.where(state.evaluated < self.initial, drawn, self.vary(vary_key, state.archive))
-        after = self.insert(task, state, population, self._evaluate(task, episode_key, level, population))
+        known = _of_level(state, level)
+        after = self.insert(task, known, population, self._evaluate(task, episode_key, level, population))
         # All elites come from checked batches.
         return after, self._progress(task, after, healthy=jnp.all(jnp.isfinite(population)))
 
@@ -172,6 +179,7 @@ class MapElites:
             archive=strong(archive),
             evaluated=state.evaluated + self.batch,
             reached=jnp.maximum(state.reached, jnp.any(reached).astype(jnp.float32)),
+            level=state.level,
         )
 
     def best(self, task: Task, state: MapElitesState) -> Policy:
@@ -242,6 +250,18 @@ class MapElites:
                 "reached": state.reached,
             },
         )
+
+
+def _of_level(state: MapElitesState, level: Int[Array, ""]) -> MapElitesState:
+    """Return the state without the elites of another level."""
+    if state.level is None:
+        return state
+    same, archive = state.level == level, state.archive
+    kept = archive.replace(
+        fitnesses=jnp.where(same, archive.fitnesses, -jnp.inf),
+        extra_scores={name: jnp.where(same, scores, 0.0) for name, scores in archive.extra_scores.items()},
+    )
+    return replace(state, archive=kept, level=level)
 
 
 def lecun_uniform(
