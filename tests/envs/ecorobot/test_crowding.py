@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
+from custom_robots import BASE, Texts
 from hypothesis import given
 from hypothesis import strategies as st
 from jaxtyping import Array
@@ -19,7 +20,7 @@ from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.locomotion import Obstacles
 from evoclaims.envs.ecorobot.pose import torso
 from evoclaims.envs.ecorobot.robots import ANT, HALF_CHEETAH, ROBOTS, SIMPLE_ROB, Robot
-from evoclaims.envs.ecorobot.scene import Scene, on_device, reach, touched_at_once
+from evoclaims.envs.ecorobot.scene import Scene, box_geoms, on_device, reach, touched_at_once
 
 ALONE = Scene(SIMPLE_ROB).model
 
@@ -80,6 +81,24 @@ def test_nowhere_are_more_boxes_within_reach_than_are_simulated(boxes: list[Box]
     )
     touched = np.sum([box.distance(points) <= reach(ALONE) for box in boxes], axis=0)
     assert np.max(touched) <= touched_at_once(ALONE, boxes) <= len(boxes)
+
+
+def test_what_touches_before_it_meets_reaches_as_far() -> None:
+    torso = '<body pos="0 0 1"><freejoint/><geom size="0.1"/><body pos="0.4 0 0"><joint/><geom size="0.1" {}/></body>'
+    plain, wide = (
+        mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{torso.format(margin)}</body></worldbody></mujoco>")
+        for margin in ("", 'margin="0.6"')
+    )
+    assert reach(wide) == pytest.approx(reach(plain) + 0.6)
+
+
+@pytest.mark.parametrize("default", ["", '<default><geom margin="0.3" gap="0.1"/></default>'])
+def test_a_task_s_boxes_take_nothing_from_a_robot_s_file(default: str, texts: Texts) -> None:
+    text = BASE.replace("<option", f"{default}<option").replace('type="capsule"', 'type="capsule" contype="0"')
+    model = Scene(
+        texts.robot(text.replace('size="0.05"', 'size="0.05" conaffinity="0"')), (Box((2.0, 0.0), (0.1, 0.1)),)
+    ).whole
+    assert model.geom_margin[box_geoms(model)].tolist() == model.geom_gap[box_geoms(model)].tolist() == [0.0]
 
 
 @pytest.mark.parametrize(

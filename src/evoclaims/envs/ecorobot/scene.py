@@ -50,7 +50,8 @@ def reach(model: mujoco.MjModel) -> float:
         pivots[body] = anchors[-1]
     geoms = touching(model)
     bodies = model.geom_bodyid[geoms]
-    arms = np.linalg.norm(model.geom_pos[geoms] - pivots[bodies], axis=1) + model.geom_rbound[geoms]
+    arms = np.linalg.norm(model.geom_pos[geoms] - pivots[bodies], axis=1)
+    arms += model.geom_rbound[geoms] + model.geom_margin[geoms]
     return float(np.max(furthest[bodies] + arms, initial=0.0))
 
 
@@ -262,6 +263,8 @@ def _compiled(robot: Robot, boxes: tuple[Box, ...]) -> mujoco.MjModel:
             solref=box.surface.solref,
             solimp=box.surface.solimp,
             condim=3,
+            margin=0.0,  # whatever the robot's file has for geoms that say none
+            gap=0.0,
             group=WORLD_GROUP,
             rgba=[0.55, 0.5, 0.45, 1.0],
         )
