@@ -80,6 +80,28 @@ def test_a_solver_that_stops_early_is_refused_naming_it(texts: Texts) -> None:
     check(Scene(texts.robot(loose.replace('timestep="0.02"', 'timestep="0.02" tolerance="1e-14"'))))
 
 
+TABLE = """
+<mujoco>
+  <option timestep="0.002"/>
+  <worldbody>
+    <geom type="plane" size="9 9 1"/>
+    <body pos="0 0 1.6">
+      <freejoint/>
+      <geom size="0.1" pos="0 0 0.1"/>
+      {feet}
+    </body>
+  </worldbody>
+</mujoco>
+"""
+"""A robot with many feet, which falls for longer than a run lasts."""
+
+
+def test_a_robot_that_starts_high_is_checked_on_the_floor(texts: Texts) -> None:
+    feet = "".join(f'<geom size="0.05" pos="{x} {y} 0"/>' for x in (-0.4, -0.1, 0.2, 0.5) for y in (-0.3, 0.0, 0.3))
+    with pytest.raises(UserError, match=r"touches at \d+ points at a time, but only contacts=4"):
+        check(Scene(texts.robot(TABLE.format(feet=feet), contacts=4)))
+
+
 def test_a_robot_is_checked_once_a_machine(texts: Texts, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     checked: list[Scene] = []
     monkeypatch.setattr(fidelity, "check", checked.append)

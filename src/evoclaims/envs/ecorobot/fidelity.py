@@ -32,7 +32,7 @@ from evoclaims.envs.ecorobot import physics
 from evoclaims.envs.ecorobot.physics import Body
 from evoclaims.envs.ecorobot.pose import torso
 from evoclaims.envs.ecorobot.robots import Robot
-from evoclaims.envs.ecorobot.scene import Scene
+from evoclaims.envs.ecorobot.scene import Scene, touching
 from evoclaims.kernels import in_numpy
 
 Numbers = NDArray[np.float64]
@@ -249,6 +249,8 @@ def frames_of(scene: Scene) -> Frames:
         mujoco.mj_normalizeQuat(model, data.qpos)
         if scene.boxes:
             _beside(scene, data, random)
+        if run % 2:
+            _to_the_floor(model, data)
         data.qvel[:] = random.standard_normal(model.nv)
         for frame in range(FRAMES):
             recorded = frame % EVERY == 0
@@ -280,10 +282,23 @@ def _beside(scene: Scene, data: mujoco.MjData, random: np.random.Generator) -> N
     outside = side * (np.array(box.half_size) + robot.torso_radius * random.uniform(0.5, 1.5))
     target = np.array(box.centre) + box.rotation[:2, :2] @ outside
     mujoco.mj_kinematics(model, data)
-    gap = target - data.xpos[1][:2]
+    _move(model, data, np.append(target - data.xpos[1][:2], 0.0))
+
+
+def _to_the_floor(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """Let down a robot that starts above the floor: it would fall for the whole run, and touch with nothing."""
+    mujoco.mj_kinematics(model, data)
+    geoms = touching(model)
+    lowest = np.min(data.geom_xpos[geoms, 2] - model.geom_rbound[geoms], initial=np.inf)
+    if 0.0 < lowest < np.inf:
+        _move(model, data, np.array([0.0, 0.0, -lowest]))
+
+
+def _move(model: mujoco.MjModel, data: mujoco.MjData, by: NDArray[np.float64]) -> None:
+    """Move a robot by a vector, as far as its torso's joints allow."""
     for joint in range(model.body_jntadr[1], model.body_jntadr[1] + model.body_jntnum[1]):
         at = model.jnt_qposadr[joint]
         if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE:
-            data.qpos[at : at + 2] += gap
+            data.qpos[at : at + 3] += by
         elif model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE:
-            data.qpos[at] += gap @ data.xaxis[joint][:2]
+            data.qpos[at] += by @ data.xaxis[joint]
