@@ -9,14 +9,19 @@ from pathlib import Path
 from typing import Any
 
 import gymnasium
+import jax
+import jax.numpy as jnp
+import numpy as np
 import pytest
 from custom_robots import BASE, Texts
 
 from evoclaims.core.errors import UserError
 from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.locomotion import Locomotion, Obstacles
+from evoclaims.envs.ecorobot.pose import Pose
 from evoclaims.envs.ecorobot.robots import ANT, IN_A_MAZE, ROBOTS, Robot
 from evoclaims.envs.ecorobot.scene import Scene, box_geoms
+from evoclaims.envs.ecorobot.sensors import distances
 from evoclaims.envs.ecorobot.stones import SteppingStones
 
 SLED = """
@@ -213,6 +218,32 @@ def test_a_maze_starts_its_robot_where_it_says(change: tuple[str, str], there: b
             match=r"stepping_stones starts its robots at x -3 and y 1, but with these as the first two positions",
         ):
             SteppingStones(robot=robot)
+
+
+@pytest.mark.parametrize(
+    ("floor", "found"),
+    [
+        ('<geom type="plane" size="9 9 1" pos="0 0 -1"/>', "a floor that is not level at z = 0"),
+        ('<geom type="plane" size="9 9 1" euler="10 0 0"/>', "a floor that is not level at z = 0"),
+        ("", "no floor"),
+    ],
+)
+def test_rangefinders_need_the_floor_that_they_measure_to(floor: str, found: str, texts: Texts) -> None:
+    robot = texts.robot(SLED.replace('<geom type="plane" size="9 9 1"/>', floor))
+    with pytest.raises(UserError, match=f"rover has {found}, and rangefinders measure to one there"):
+        distances(Scene(robot), Pose(jnp.zeros(3), jnp.eye(3)), np.zeros(1))
+
+
+class _Named(SteppingStones):
+    def measures(self, outing: Any) -> dict[str, Any]:
+        return {"reached": jnp.ones(()), "x": jnp.ones(()), "mine": jnp.ones(())}
+
+
+def test_a_task_s_measures_have_names_of_their_own() -> None:
+    """One called "reached" was the trial's success."""
+    task = _Named(episode_steps=1)
+    with pytest.raises(UserError, match=r"have reached, x\. Rename these measures of 'stepping_stones'\."):
+        jax.eval_shape(lambda key: task.episode(lambda seen: jnp.zeros(task.action_size), key, 0), jax.random.key(0))
 
 
 @pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS)

@@ -314,7 +314,7 @@ class RobotTask(ABC):
             (state, total), way = self._played(policy, start), ()
         outing: Outing = state.inner
         steps = outing.time.astype(jnp.float32)
-        metrics = {
+        engine = {
             "x": outing.pose.place[0],
             "y": outing.pose.place[1],
             "reached": self.reached(outing).astype(jnp.float32),
@@ -322,10 +322,11 @@ class RobotTask(ABC):
             "effort": outing.effort,
             "upside_down": outing.overturned / steps,
             "episode_steps": steps,
-            **self.measures(outing),
-            **(self.path_measures(*way) if follow else {}),
         }
-        return Episode(fitness=total, success=metrics["reached"], metrics=metrics)
+        own = {**self.measures(outing), **(self.path_measures(*way) if follow else {})}
+        if taken := sorted(engine.keys() & own):
+            raise UserError(f"All robots' tasks have {', '.join(taken)}. Rename these measures of {self.name!r}.")
+        return Episode(fitness=total, success=engine["reached"], metrics={**engine, **own})
 
     def _played(self, policy: PolicyFn, start: TaskState) -> tuple[TaskState, Float[Array, ""]]:
         """Play from `start`; on a GPU, a perceptron's whole episode is one kernel (`episode_in_one_kernel`)."""

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from numbers import Real
 from typing import Final, Protocol
 
 import jax.numpy as jnp
+import mujoco
 import numpy as np
 from jaxtyping import Array, Float
 
@@ -17,6 +19,10 @@ from evoclaims.envs.ecorobot.scene import Scene
 
 ARENA: Final = math.hypot(8.0, 8.0)
 """The diagonal of the paper's arena, m."""
+
+
+NOTHING: Final = 1e-6
+"""By how much a floor may be off, m or in its direction."""
 
 
 class Sensor(Protocol):
@@ -65,6 +71,7 @@ def distances(scene: Scene, pose: Pose, angles: np.ndarray) -> Float[Array, " ra
     ahead = np.stack([np.cos(turned), np.sin(turned), np.zeros_like(turned)], axis=1)
     directions = jnp.asarray(ahead, jnp.float32) @ pose.rotation.T
     origins = pose.place[None] + scene.robot.torso_radius * directions
+    _require_level_floor(scene)
     # The floor: hit from above, by rays that point down.
     down = jnp.minimum(directions[:, 2], 0.0)
     nearest = jnp.where(down < 0, jnp.maximum(origins[:, 2], 0.0) / jnp.maximum(-down, 1e-9), jnp.inf)
@@ -82,3 +89,25 @@ def distances(scene: Scene, pose: Pose, angles: np.ndarray) -> Float[Array, " ra
     leaves = jnp.min(jnp.maximum(one, other), axis=-1)
     hits = jnp.where((enters <= leaves) & (leaves >= 0), jnp.maximum(enters, 0.0), jnp.inf)
     return jnp.minimum(nearest, jnp.min(hits, axis=1))
+
+
+@lru_cache(maxsize=64)
+def _require_level_floor(scene: Scene) -> None:
+    """Check that rays which point down meet the floor at z = 0, where `distances` has it.
+
+    Raises:
+        UserError: where the robot's file has it elsewhere, tilted, or not at all, although its torso may tilt.
+    """
+    model = scene.whole
+    planes = np.flatnonzero((model.geom_bodyid == 0) & (model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE))
+    normals = np.zeros((len(planes), 3))
+    for normal, plane in zip(normals, planes, strict=True):
+        mujoco.mju_rotVecQuat(normal, np.array([0.0, 0.0, 1.0]), model.geom_quat[plane])
+    level = (np.abs(model.geom_pos[planes, 2]) < NOTHING) & (normals[:, 2] > 1.0 - NOTHING)
+    if len(planes) and level.all():
+        return
+    found = "no floor" if not len(planes) else "a floor that is not level at z = 0"
+    raise UserError(
+        f"The robot {scene.robot.name} has {found}, and rangefinders measure to one there. Write a plane at z = 0 into "
+        "its file, or give the task no sensor."
+    )
