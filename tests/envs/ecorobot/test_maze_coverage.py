@@ -13,8 +13,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from evoclaims.core.errors import UserError
+from evoclaims.envs.ecorobot.boxes import Box
 from evoclaims.envs.ecorobot.deceptive import DeceptiveMaze
-from evoclaims.envs.ecorobot.maze import CELLS, FINE
+from evoclaims.envs.ecorobot.maze import CELLS, FINE, MazePlan
 from evoclaims.envs.ecorobot.robots import ANT
 from evoclaims.envs.ecorobot.stones import STONES, SteppingStones
 
@@ -112,3 +114,33 @@ def test_coverage_is_the_share_of_reachable_cells_and_never_falls_as_a_path_grow
         assert covered == pytest.approx(len(been) / ground.sum())
         assert last <= covered <= 1.0
         last = covered
+
+
+class _Unfenced(DeceptiveMaze):
+    """The easy maze's ground, with nothing around it."""
+
+    @property
+    def plan(self) -> MazePlan:
+        return super().plan._replace(walls=())
+
+
+def test_a_path_outside_the_area_covers_nothing() -> None:
+    (low, high), (south, north) = _Unfenced().area
+    inside = [(low + 0.01, (south + north) / 2)]
+    outside = [(low - 5.0, y) for y in np.linspace(south, north, STEPS - 1)]
+    measure = jax.jit(lambda path: _Unfenced().path_measures(path, jnp.ones(len(path), bool))["coverage"])
+    assert 0.0 < float(measure(jnp.array(inside))) == float(measure(jnp.array([*inside, *outside])))
+    assert float(measure(jnp.array([(high, north)]))) > 0.0
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"start": (-100.0, 0.0)}, r"has start=\(-100.0, 0.0\), outside its area or in a wall"),
+        ({"walls": (Box((0.0, 0.0), (1.0, 1.0), angle=30.0),), "start": (0.9, 0.0)}, "outside its area or in a wall"),
+        ({"target": (0.1, 0.0), "within": 0.1, "start": (0.0, 0.0), "walls": ()}, "not farther from target="),
+    ],
+)
+def test_a_plan_whose_start_is_no_place_to_start_is_one_sentence(changes: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(UserError, match=sentence):
+        DeceptiveMaze().plan._replace(area=((-5.0, 5.0), (-5.0, 5.0)), **changes)

@@ -54,6 +54,14 @@ class MazePlan(_Plan):
             )
         if not 0 < within < math.inf:
             raise UserError(f"A MazePlan has within={within}. Write a finite distance above 0, in m.")
+        outside = any(not low <= at <= high for at, (low, high) in zip(start, area, strict=True))
+        if outside or any(wall.distance(np.array([start]))[0] <= 0.0 for wall in walls):
+            raise UserError(f"A MazePlan has start={start}, outside its area or in a wall. Write another place.")
+        if math.dist(start, target) <= within:
+            raise UserError(
+                f"A MazePlan has start={start}, which is not farther from target={target} than within={within}: it "
+                "would be reached before the first step."
+            )
         return super().__new__(cls, walls, area, start, target, within)
 
     @classmethod
@@ -107,8 +115,9 @@ class Maze(RobotTask):
         size = jnp.asarray(CELLS)
         share = (path - low[None]) / (high - low)[None]
         cell = jnp.floor(share * size[None].astype(jnp.float32)).astype(jnp.int32)
+        inside = jnp.all((share >= 0.0) & (share <= 1.0), axis=1)
         cell = jnp.clip(cell, 0, size[None] - 1)
-        been = jnp.zeros(CELLS, bool).at[cell[:, 0], cell[:, 1]].max(alive)
+        been = jnp.zeros(CELLS, bool).at[cell[:, 0], cell[:, 1]].max(alive & inside)
         return {"coverage": jnp.sum(been & ground).astype(jnp.float32) / float(ground.sum())}
 
 
