@@ -55,6 +55,7 @@ class Probe:
     revision: ClassVar[int] = 1
     packages: ClassVar[tuple[str, ...]] = ()
     action_size: ClassVar[int] = 1
+    errors_cost: ClassVar[bool] = True
 
     name: str
     cases: tuple[Case, ...]

@@ -50,11 +50,17 @@ def test_unscored_outputs_do_not_matter(gate: Gate, unscored: float) -> None:
     assert (episode.fitness == 0.0).all()
 
 
-@pytest.mark.parametrize("output", [0.0, -0.0, np.nan])
+@pytest.mark.parametrize("output", [0.0, -0.0, -np.inf])
 def test_an_output_that_is_not_above_0_is_the_bit_0(output: float) -> None:
     right = right_answers(GATES["parity of 2"].last)
     assert _examine(NParity(2), np.where(right < 0, output, 1.0)).success[0] == 1.0
     assert _examine(NParity(2), np.where(right > 0, output, -1.0)).success[0] == 0.5
+
+
+def test_no_number_is_the_answer_to_nothing() -> None:
+    episode = _examine(NParity(2), np.full_like(right_answers(GATES["parity of 2"].last), np.nan))
+    assert (episode.success == 0.0).all()
+    assert (episode.fitness == -1.0).all()
 
 
 @few

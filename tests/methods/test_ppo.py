@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -108,6 +108,17 @@ def test_sampled_episodes_of_more_than_one_step_are_one_sentence() -> None:
         sampled.init(jax.random.key(0), NParity(3, sampling="exhaustive"))
     sampled.init(jax.random.key(0), NParity(3, sampling="sampled"))
     SMALL.init(jax.random.key(0), NParity(3, sampling="exhaustive"))
+
+
+class _Silent(Probe):
+    errors_cost: ClassVar[bool] = False
+
+
+def test_sampled_episodes_whose_errors_need_not_cost_are_one_sentence() -> None:
+    """Of any other reward each that is not below 0 would count as success."""
+    sampled = replace(SMALL, level_test=LevelTest(sampled_episodes=8))
+    with pytest.raises(UserError, match=r"nothing says that silent pays so\. Write `errors_cost:"):
+        sampled.init(jax.random.key(0), _Silent("silent", cases=((((0.0,), None),),), cases_at_level=(1,)))
 
 
 def test_a_no_is_learnt_where_a_no_is_paid() -> None:

@@ -114,7 +114,8 @@ class Ppo:
         """Draw the networks' parameters and start the environments at level 0.
 
         Raises:
-            UserError: when the level test samples episodes, which are one step, but those of `task` are longer.
+            UserError: when the level test samples episodes, but those of `task` are longer than a step, or their reward
+                does not say whether the step was faultless.
         """
         if self.level_test.sampled_episodes and task.horizon > 1:
             raise UserError(
@@ -122,6 +123,12 @@ class Ppo:
                 f"to {task.horizon} steps, so the first one would decide alone. Let the task draw one row per "
                 "episode (sampling='sampled'), or test the deterministic policy on the whole table "
                 "(sampled_episodes=0)."
+            )
+        if self.level_test.sampled_episodes and not getattr(task, "errors_cost", False):
+            raise UserError(
+                "PPO's level test by sampled episodes takes a reward of at least 0 for a step without error, and "
+                f"nothing says that {task.name} pays so. Write `errors_cost: ClassVar[bool] = True` in it if exactly "
+                "an error's reward is below 0, or test the deterministic policy (sampled_episodes=0)."
             )
         policy_key, value_key, reset_key = streams(key, "policy", "value", "reset")
         net = self._networks(task)

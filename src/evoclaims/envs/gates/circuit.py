@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, Literal, get_args
+from typing import Any, ClassVar, Literal, get_args
 
 import jax
 import jax.numpy as jnp
@@ -115,8 +115,11 @@ class Circuit(ABC):
     Attributes:
         sampling: "exhaustive": an episode asks every row of the level in order, and its fitness is minus the mean
             error; "sampled": an episode is one step on a row drawn uniformly from the level. The error of a row is the
-            share of its active outputs that are wrong; an output x is read as the bit x > 0.
+            share of its active outputs that are wrong; an output x is read as the bit x > 0, and NaN is wrong.
     """
+
+    errors_cost: ClassVar[bool] = True
+    """Exactly an error's reward is below 0."""
 
     sampling: Sampling
 
@@ -205,9 +208,9 @@ class Circuit(ABC):
     def _errors(
         self, outputs: Float[Array, "rows action"], index: Int[Array, " rows"]
     ) -> tuple[Float[Array, " rows"], Bool[Array, " rows"]]:
-        """Return each row's share of wrong active outputs, and whether none is wrong."""
+        """Return each row's share of wrong active outputs, and whether none is wrong; no number is no answer."""
         active = jnp.asarray(self.table.active)[index]
-        wrong = active & ((outputs > 0) != jnp.asarray(self.table.targets)[index])
+        wrong = active & (((outputs > 0) != jnp.asarray(self.table.targets)[index]) | jnp.isnan(outputs))
         share = jnp.sum(wrong, axis=-1) / jnp.sum(active, axis=-1)
         return share.astype(jnp.float32), ~jnp.any(wrong, axis=-1)
 
