@@ -70,6 +70,15 @@ def test_each_event_holds_where_its_name_says(group: Any, event: Any, held: tupl
     assert _read(event(made), made) == held
 
 
+def test_a_level_that_was_not_trained_on_is_not_solved_by_a_later_one(group: Any) -> None:
+    """A trial that goes directly to the last level had solved all levels before it, too."""
+    made = group(lambda seed: 1.0)
+    (trial,) = made.fetch(range(1))
+    direct = replace(trial, levels={**trial.levels, "solved_at": (-1.0, 4.0)})
+    events = (made.solves_level(0), made.solves_level(1), made.solves_the_last_level)
+    assert [event.sample({made.fingerprint: (direct,)}).values for event in events] == [(0.0,), (1.0,), (1.0,)]
+
+
 @pytest.mark.parametrize(
     ("event", "said"),
     [

@@ -286,9 +286,14 @@ class TrialGroup:
         return self.event("does not solve the last level", lambda t: t.metrics["furthest_solved"] < last)
 
     def solves_level(self, level: int) -> Event:
-        """This level, counted from 0, was solved while training."""
+        """This level, counted from 0, was solved while training; not where that stayed on the last level alone."""
         self._require_level(level, 0, self.condition.task.levels - 1)
-        return self.event(f"solves level {level}", lambda t: t.metrics["furthest_solved"] >= level)
+
+        def solved(trial: TrialResult) -> bool:
+            at = trial.levels.get("solved_at")
+            return bool(at[level] >= 0.0 if at else trial.metrics["furthest_solved"] >= level)
+
+        return self.event(f"solves level {level}", solved)
 
     def solves_no_level_beyond(self, level: int) -> Event:
         """No level above `level` (counted from 0; -1 for none at all) was solved while training."""
