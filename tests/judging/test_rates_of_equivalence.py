@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from test_outcome_rates import DESIGNS, REFUTED, SMALLER, SUPPORTED, ended
 from evoclaims.judging.design import Design
 from evoclaims.judging.exact import rank_test
 from evoclaims.judging.kinds.equivalent import Equivalent, equivalence_tests
+from evoclaims.judging.sample import UnreadableTrialError
 from evoclaims.judging.verdict import Outcome, PValues
 
 DRAWS = {False: 400, True: 100}
@@ -104,3 +106,17 @@ def test_the_p_of_many_draws_are_those_of_the_judge(source, tied: bool) -> None:
         assert p.supported == max(test.p for test in equivalence_tests(a, b, MARGIN))
         assert p_inside(0.6, 10, tied)[at] == pytest.approx(p.supported)
         assert p_outside(0.6, 10, tied)[at] == pytest.approx(p.refuted)
+
+
+def test_a_margin_below_what_tells_numbers_apart_is_refused(source: Any) -> None:
+    """Values 0.015 apart counted as equal, and so as within 0.001."""
+    one, other = (
+        source(name, [20_000.5 + apart + k / 10**7 for k in range(10)]) for name, apart in (("a", 0.0), ("b", 0.015))
+    )
+    with pytest.raises(UnreadableTrialError, match=r"numbers as large as 20000\.5 count as equal up to 0\.04"):
+        _found(Equivalent(one.score(), other.score(), 0.001), one, other)
+    assert _found(Equivalent(one.score(), other.score(), 0.05), one, other).p.supported < 0.05
+
+
+def _found(claim: Equivalent, *sides: Any) -> Any:
+    return claim.find({side.fingerprint: side.fetch(range(10)) for side in sides}, DESIGNS["ten"], 0.05)

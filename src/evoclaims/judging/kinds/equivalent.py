@@ -12,7 +12,7 @@ from evoclaims.judging.assertion import Assertion, Entry, Finding
 from evoclaims.judging.design import Design
 from evoclaims.judging.exact import ExactTest, rank_attainable, rank_test
 from evoclaims.judging.reading import NumberReading, require_independent
-from evoclaims.judging.sample import Trials, levelled
+from evoclaims.judging.sample import RESOLUTION, Trials, UnreadableTrialError, levelled
 from evoclaims.judging.verdict import Bound, PValues
 from evoclaims.judging.window import total
 
@@ -61,6 +61,12 @@ class Equivalent(Assertion):
         """Run the two tests for it and the two against it."""
         left, right = levelled(self.left.sample(trials), self.right.sample(trials))
         a, b = left.values, right.values
+        largest = max((abs(value) for value in (*a, *b) if math.isfinite(value)), default=0.0)
+        if self.margin <= (apart := 2 * RESOLUTION * largest):  # each side may be moved by it
+            raise UnreadableTrialError(
+                f"The margin {self.margin:g} of {self.describe()!r} cannot be judged: numbers as large as {largest:g} "
+                f"count as equal up to {apart:g}. Write a margin above that"
+            )
         raised, lowered = _shifted(a, self.margin), _shifted(a, -self.margin)
         inside = equivalence_tests(a, b, self.margin)
         outside = (rank_test(b, raised), rank_test(lowered, b))
