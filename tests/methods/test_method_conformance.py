@@ -68,16 +68,6 @@ def test_another_key_gives_another_state_where_a_method_learns(entry: Entry, ben
     assert same_bits(one, other) != entry.learns
 
 
-@pytest.mark.newest  # the plain step compiles each of its operations alone
-def test_a_compiled_step_is_the_plain_step(bench: Workbench) -> None:
-    state, _ = bench.run(1)
-    close(
-        bench.plain_step(jax.random.key(9), LEVEL, state),
-        bench.usual_step(jax.random.key(9), LEVEL, state),
-        tolerance=1e-4,  # XLA fuses multiplications and additions
-    )
-
-
 @pytest.mark.newest  # smoke compiles each method's trials side by side
 def test_trials_side_by_side_in_a_loop_are_the_trials_one_by_one(bench: Workbench) -> None:
     seeds = (3, 8)
