@@ -286,7 +286,7 @@ class TrialGroup:
         return self.event("does not solve the last level", lambda t: t.metrics["furthest_solved"] < last)
 
     def solves_level(self, level: int) -> Event:
-        """This level, counted from 0, was solved while training; not where that stayed on the last level alone."""
+        """This level, counted from 0, was solved while training."""
         self._require_level(level, 0, self.condition.task.levels - 1)
 
         def solved(trial: TrialResult) -> bool:
