@@ -138,7 +138,10 @@ def test_a_path_outside_the_area_covers_nothing() -> None:
     [
         ({"start": (-100.0, 0.0)}, r"has start=\(-100.0, 0.0\), outside its area or in a wall"),
         ({"walls": (Box((0.0, 0.0), (1.0, 1.0), angle=30.0),), "start": (0.9, 0.0)}, "outside its area or in a wall"),
-        ({"target": (0.1, 0.0), "within": 0.1, "start": (0.0, 0.0), "walls": ()}, "not farther from target="),
+        (
+            {"target": (0.1, 0.0), "within": 0.1, "start": (0.0, 0.0), "walls": ()},
+            "exactly within=0.1 of",
+        ),
     ],
 )
 def test_a_plan_whose_start_is_no_place_to_start_is_one_sentence(changes: dict[str, Any], sentence: str) -> None:

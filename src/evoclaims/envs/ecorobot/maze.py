@@ -57,10 +57,10 @@ class MazePlan(_Plan):
         outside = any(not low <= at <= high for at, (low, high) in zip(start, area, strict=True))
         if outside or any(wall.distance(np.array([start]))[0] <= 0.0 for wall in walls):
             raise UserError(f"A MazePlan has start={start}, outside its area or in a wall. Write another place.")
-        if math.dist(start, target) <= within:
+        if math.isclose(math.dist(start, target), within, rel_tol=1e-6):
             raise UserError(
-                f"A MazePlan has start={start}, which is not farther from target={target} than within={within}: it "
-                "would be reached before the first step."
+                f"A MazePlan has start={start} exactly within={within} of target={target}, and rewards are shares of "
+                "the way between. Write another distance."
             )
         return super().__new__(cls, walls, area, start, target, within)
 
