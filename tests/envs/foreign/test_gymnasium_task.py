@@ -56,6 +56,22 @@ def test_a_policy_is_examined_on_the_host_from_its_own_starts() -> None:
     assert set(starts[0]).isdisjoint(starts[1])
 
 
+def test_examined_starts_are_none_that_seeds_derived_as_numpy_says_have(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[int] = []
+    reset = gymnasium.wrappers.TimeLimit.reset
+
+    def watched(self: Any, *, seed: int, **more: Any) -> Any:
+        seen.append(seed)
+        return reset(self, seed=seed, **more)
+
+    monkeypatch.setattr(gymnasium.wrappers.TimeLimit, "reset", watched)
+    CART.examine_natively(lambda observation: 0, 7)
+    root = np.random.SeedSequence(7)
+    derived = {int(one) for source in (root, *root.spawn(100)) for one in source.generate_state(100)}
+    assert len(set(seen)) == 4
+    assert derived.isdisjoint(seen)
+
+
 def test_it_has_the_environment_s_sizes_and_limit() -> None:
     assert (CART.observation_size, CART.action_size, CART.horizon) == (4, 2, 500)
     short = GymnasiumTask("Pendulum-v1", {"g": 9.81}, episode_steps=30, examined_episodes=1)
@@ -126,7 +142,8 @@ def test_a_return_is_the_sum_without_errors_on_the_way(monkeypatch: pytest.Monke
 def test_the_class_of_a_user_s_own_environment_is_looked_at(maker: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     spec = gymnasium.envs.registration.EnvSpec("Own-v0", entry_point=maker)
     monkeypatch.setitem(gymnasium.registry, "Own-v0", spec)
-    assert list(code_of(GymnasiumTask("Own-v0"))) == [f"{__name__}.Own"]
+    for name in ("Own-v0", f"{__name__}:Own-v0"):
+        assert list(code_of(GymnasiumTask(name))) == [f"{__name__}.Own"]
     assert code_of(CART) == code_of(GymnasiumTask("CartPole-v9")) == {}
 
 

@@ -155,6 +155,31 @@ def test_a_number_that_is_not_finite_ends_the_episode() -> None:
         assert np.array_equal(before, after, equal_nan=True)
 
 
+@pytest.mark.parametrize("actions", [Choice(2), Range((-2.0,), (2.0,), (1,))])
+def test_a_policy_that_answers_nan_solves_nothing(actions: Choice | Range) -> None:
+    """Its episode ended at once with a return of 0, which is above all others where rewards are below 0."""
+
+    class Costly(BraxTask):
+        def begin(self, key: Any) -> Any:
+            return replace(super().begin(key), state=jnp.int32(0))
+
+        @property
+        def actions(self) -> Choice | Range:
+            return actions
+
+        def advance(self, key: Any, state: Any, action: Any) -> Any:
+            return Moment(state=state, observation=jnp.zeros(2), reward=jnp.float32(-1), terminated=jnp.zeros((), bool))
+
+    task = Costly("fast", episode_steps=12, examined_episodes=2, solved_at=-5)
+    lost = task.examine(lambda observation: jnp.full(task.action_size, jnp.nan), jax.random.key(0), jnp.int32(0))
+    assert (np.isnan(lost.fitness), float(lost.success), float(lost.metrics["episode_steps"])) == (True, 0.0, 1.0)
+    sound = task.examine(lambda observation: jnp.zeros(task.action_size), jax.random.key(0), jnp.int32(0))
+    assert (float(sound.fitness), float(sound.success)) == (-12.0, 0.0)
+    if isinstance(actions, Range):  # another choice than a whole number is refused
+        fitness, success, _ = task.examine_natively(lambda observation: np.full(1, np.nan), 0)
+        assert (np.isnan(fitness), success) == (True, 0.0)
+
+
 @pytest.mark.parametrize("how", ["truncated", "reward", "observation"])
 def test_a_policy_scores_the_same_in_both_examinations(how: str) -> None:
     class Ending(BraxTask):
@@ -176,7 +201,7 @@ def test_a_policy_scores_the_same_in_both_examinations(how: str) -> None:
     compiled = task.examine(lambda observation: jnp.zeros(1), jax.random.key(0), jnp.int32(0))
     fitness, success, metrics = task.examine_natively(lambda observation: np.zeros(1), 0)
     assert fitness == pytest.approx(0.7 * (4 if how == "truncated" else 3)) == compiled.fitness
-    assert success == 1.0 == compiled.success
+    assert success == float(how == "truncated") == compiled.success  # what broke off is not solved
     assert metrics == {"episode_steps": 4.0} == compiled.metrics
 
 

@@ -109,11 +109,13 @@ class Inner:
         state: the environment's own.
         key: data of the key that the next step's key derives from; keys themselves are no arrays.
         time: environment steps made.
+        sound: whether all numbers were finite.
     """
 
     state: Any
     key: Array
     time: Int[Array, ""]
+    sound: Bool[Array, ""]
 
 
 @dataclass(frozen=True)
@@ -149,7 +151,8 @@ class Descriptor:
 class JaxTask(ForeignTask):
     """An environment in jax. A subclass has revision, `make`, `begin`, `advance` and `actions`.
 
-    A step after which a number is not finite is undone: no reward, and the episode ends.
+    A step after which a number is not finite is undone: no reward, and the episode ends, unsolved. If the action was
+    NaN, so is the reward, since the policy has diverged.
 
     Attributes:
         episode_steps: environment steps after which an episode is truncated.
@@ -212,7 +215,8 @@ class JaxTask(ForeignTask):
         with implicit_promotions():
             moment = self.begin(begin_key)
         no = jnp.zeros((), bool)
-        inner = Inner(state=moment.state, key=jax.random.key_data(later_key), time=jnp.zeros((), jnp.int32))
+        time, key_data = jnp.zeros((), jnp.int32), jax.random.key_data(later_key)
+        inner = Inner(state=moment.state, key=key_data, time=time, sound=~no)
         return TaskState(
             observation=_flat(moment.observation),
             reward=jnp.zeros(()),
@@ -225,12 +229,16 @@ class JaxTask(ForeignTask):
         """Act once."""
         inner: Inner = state.inner
         step_key, later_key = streams(jax.random.wrap_key_data(inner.key), "step", "later")
+        numbers = fitting(self, action)
         with implicit_promotions():
-            found = self.advance(step_key, inner.state, self.actions.chosen(fitting(self, action)))
-        moment, sound = self._ruled(found, inner.time + 1)
+            found = self.advance(step_key, inner.state, self.actions.chosen(numbers))
+        moment, sound = self._ruled(found, inner.time + 1, jnp.any(jnp.isnan(numbers)))
         reached = strong(
             Inner(
-                state=select(sound, moment.state, inner.state), key=jax.random.key_data(later_key), time=inner.time + 1
+                state=select(sound, moment.state, inner.state),
+                key=jax.random.key_data(later_key),
+                time=inner.time + 1,
+                sound=sound,
             )
         )
         return TaskState(
@@ -241,15 +249,17 @@ class JaxTask(ForeignTask):
             inner=reached,
         )
 
-    def _ruled(self, moment: Moment, steps: Int[Array, ""]) -> tuple[Moment, Bool[Array, ""]]:
+    def _ruled(self, moment: Moment, steps: Int[Array, ""], lost: Bool[Array, ""]) -> tuple[Moment, Bool[Array, ""]]:
         """Return what counts of the moment after some steps, and whether its numbers are finite.
+
+        Where the policy was `lost`, its action was no number.
 
         Each examination follows this rule, so that a policy scores the same whatever has trained it.
         """
-        sound = jnp.all(jnp.isfinite(_flat(moment.observation))) & jnp.isfinite(moment.reward)
+        sound = jnp.all(jnp.isfinite(_flat(moment.observation))) & jnp.isfinite(moment.reward) & ~lost
         terminated = moment.terminated | ~sound
         truncated = (moment.truncated | (steps >= self.episode_steps)) & ~terminated
-        reward = jnp.where(sound, moment.reward, 0.0)
+        reward = jnp.where(sound, moment.reward, jnp.where(lost, jnp.nan, 0.0))
         return replace(moment, reward=reward, terminated=terminated, truncated=truncated), sound
 
     def episode(self, policy: PolicyFn, key: PRNGKeyArray, level: Int[Array, ""]) -> Episode:
@@ -263,7 +273,8 @@ class JaxTask(ForeignTask):
                     f"has {state.observation.size} numbers. Write places from 0 to {state.observation.size - 1}."
                 )
             metrics |= {name: state.observation[at] for name, at in zip("xy", self.descriptor.places, strict=True)}
-        return Episode(fitness=total, success=(total >= self.threshold).astype(jnp.float32), metrics=metrics)
+        solved = (total >= self.threshold) & state.inner.sound
+        return Episode(fitness=total, success=solved.astype(jnp.float32), metrics=metrics)
 
     def examine(self, policy: PolicyFn, key: PRNGKeyArray, level: Int[Array, ""]) -> Episode:
         """Run `examined_episodes` from different starts and average; success is the share that is solved."""
@@ -295,20 +306,20 @@ class JaxTask(ForeignTask):
             return array_action(actions.shape, action, self.name)
 
         @jax.jit
-        def advance(key: Array, state: Any, action: Array, steps: Array) -> Moment:
-            return self._ruled(self.advance(key, state, action), steps)[0]
+        def advance(key: Array, state: Any, action: Array, steps: Array) -> tuple[Moment, Bool[Array, ""]]:
+            return self._ruled(self.advance(key, state, action), steps, jnp.any(jnp.isnan(action)))
 
-        def one(key: Array) -> tuple[float, int]:
+        def one(key: Array) -> tuple[float, int, bool]:
             key, begin_key = jax.random.split(key)
             moment, total = begin(begin_key), np.float32(0.0)
             for step in count(1):
                 key, step_key = jax.random.split(key)
                 action = jnp.asarray(native(policy(np.asarray(moment.observation))))
-                moment = advance(step_key, moment.state, action, np.int32(step))
+                moment, sound = advance(step_key, moment.state, action, np.int32(step))
                 total += np.float32(moment.reward)
                 if moment.terminated or moment.truncated:
                     break
-            return float(total), step
+            return float(total), step, bool(sound)
 
         with implicit_promotions():
             return self.scores(map(one, jax.random.split(trial_key(seed, EVALUATION), self.examined_episodes)))

@@ -90,8 +90,14 @@ class ForeignTask(ABC):
         """The return that solves an episode; infinity where none does."""
         return math.inf if self.solved_at is None else self.solved_at
 
-    def scores(self, played: Iterable[tuple[float, int]]) -> Scored:
-        """Return the mean return of episodes, the share that is solved, and their mean length, from (return, steps)."""
-        returns, lengths = zip(*played, strict=True)
-        solved = sum(total >= self.threshold for total in returns) / len(returns)
+    def scores(self, played: Iterable[tuple[float, int, bool]]) -> Scored:
+        """Return the mean return of episodes, the share that is solved, and their mean length.
+
+        Args:
+            played: of each episode the return, the steps, and whether all its numbers were finite.
+        """
+        returns, lengths, sound = zip(*played, strict=True)
+        solved = sum(fine and total >= self.threshold for total, fine in zip(returns, sound, strict=True)) / len(
+            returns
+        )
         return fmean(returns), solved, {"episode_steps": fmean(lengths)}
