@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import jax
 import numpy as np
 import pytest
 import toy_loops
@@ -25,7 +26,7 @@ from evoclaims.envs.foreign.gymnasium_task import GymnasiumTask
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.judging.sample import UnreadableTrialError, checked
 from evoclaims.methods.training_loop import TrainingLoop
-from evoclaims.trials import failed, loop_trials
+from evoclaims.trials import failed, loop_examination, loop_trials
 from evoclaims.trials.loop_messages import Trained
 from evoclaims.trials.loop_process import Reporter, actions_of
 from evoclaims.trials.loop_trials import Child, trained_record
@@ -218,6 +219,22 @@ def test_a_policy_is_examined_as_all_are_be_it_of_numpy_or_of_jax(store: Store, 
     assert wrong.metrics["furthest_solved"] == -1.0
     (table,) = run(condition(toy_loops.knows_by_text, NParity(3)), [0], store, cpus)
     assert table.levels["success"] == (1.0, 1.0)  # no text of a traced observation is in it
+
+
+@pytest.mark.parametrize("how", ["catches an error", "asks for a type"])
+def test_a_policy_that_acts_otherwise_while_jax_traces_it_is_examined_as_it_acts(how: str) -> None:
+    task = NParity(3)
+    table = {tuple(row > 0): right for row, right in zip(task.table.inputs, task.table.targets, strict=True)}
+
+    def policy(seen: Any) -> Any:
+        if how == "asks for a type" and not isinstance(seen, np.ndarray):
+            return -seen[:1]
+        try:
+            return 2.0 * np.asarray(table[tuple(np.asarray(seen) > 0)], np.float32) - 1.0
+        except jax.errors.JAXTypeError:
+            return -seen[:1]
+
+    assert loop_examination.examined(task, policy, 0).success == (1.0, 1.0)
 
 
 def _is_alive(pid: int) -> bool:

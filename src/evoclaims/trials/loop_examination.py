@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Final
 
 import jax
 import jax.numpy as jnp
@@ -18,6 +18,9 @@ from evoclaims.trials.devices import MATMUL_PRECISION
 from evoclaims.trials.jax_options import refuse_changed
 from evoclaims.trials.loop_messages import Scores
 from evoclaims.trials.program import examine_every_level
+
+LOOKS: Final = 8
+"""Observations of a kind at which a policy is asked twice."""
 
 
 def examined(task: Task, policy: Callable[[Any], Any], seed: int) -> Scores:
@@ -52,7 +55,8 @@ def _fitted(task: Task, policy: Callable[[Any], Any]) -> Callable[[Array], Array
     """Return a policy that jax can trace: the given one, or else one that calls it on the host.
 
     A table whose keys are texts, as `table.get(str(observation), 0)`, is traced without an error, and never finds what
-    it looks for. So one whose traced action does not depend on the observation is called on the host, too.
+    it looks for; one that catches an error, or asks for a type, may act by another rule. So a policy is called on the
+    host, too, where its traced action does not depend on the observation, or is not the host's.
     """
 
     def traced(observation: Array) -> Array:
@@ -70,7 +74,24 @@ def _fitted(task: Task, policy: Callable[[Any], Any]) -> Callable[[Array], Array
         program = jax.make_jaxpr(traced)(jax.ShapeDtypeStruct((task.observation_size,), jnp.float32))
     except Exception:  # PyTorch and NumPy each have their own way to refuse what jax traces
         return called
-    return traced if _depends(program.jaxpr) else called
+    return traced if _depends(program.jaxpr) and _act_alike(task, traced, host) else called
+
+
+def _act_alike(task: Task, one: Callable[[Array], Array], host: Callable[[Array], Any]) -> bool:
+    """Whether a traced policy acts as on the host, at starts of each level and elsewhere."""
+    compiled, keys = jax.jit(one), jax.random.split(jax.random.key(0), LOOKS)
+    levels = jnp.arange(LOOKS, dtype=jnp.int32) % task.levels
+    with jax.default_matmul_precision(MATMUL_PRECISION):
+        starts = jax.jit(jax.vmap(lambda key, level: task.reset(key, level).observation))(keys, levels)
+        for observation in (*np.asarray(starts), *fixed_observations(task, LOOKS)):
+            try:
+                acted = host(observation)
+            except Exception:  # it is for jax alone
+                return True
+            fits = acted.shape == (task.action_size,)  # else the task says what is wrong
+            if fits and not np.allclose(compiled(observation), acted, rtol=1e-3, atol=1e-3, equal_nan=True):
+                return False
+    return True
 
 
 def _depends(program: Any) -> bool:
