@@ -180,6 +180,21 @@ def test_a_policy_that_answers_nan_solves_nothing(actions: Choice | Range) -> No
         assert (np.isnan(fitness), success) == (True, 0.0)
 
 
+def test_a_return_that_32_bits_make_smaller_solves_an_episode() -> None:
+    class Hundredths(BraxTask):
+        def begin(self, key: Any) -> Any:
+            return replace(super().begin(key), state=jnp.int32(0))
+
+        def advance(self, key: Any, state: Any, action: Any) -> Any:
+            return Moment(state, jnp.zeros(2), jnp.float32(0.01), terminated=jnp.zeros((), bool))
+
+    for wanted, solves in ((1.0, 1.0), (1.001, 0.0)):
+        task = Hundredths("fast", episode_steps=100, examined_episodes=1, solved_at=wanted)
+        found = task.examine(lambda observation: jnp.zeros(1), jax.random.key(0), jnp.int32(0))
+        assert float(found.fitness) < 1.0
+        assert float(found.success) == solves == task.examine_natively(lambda observation: np.zeros(1), 0)[1]
+
+
 @pytest.mark.parametrize("how", ["truncated", "reward", "observation"])
 def test_a_policy_scores_the_same_in_both_examinations(how: str) -> None:
     class Ending(BraxTask):

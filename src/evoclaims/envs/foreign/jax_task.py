@@ -191,8 +191,9 @@ class JaxTask(ForeignTask):
 
     @property
     def threshold(self) -> float:
-        """The return that solves an episode, in the 32 bits that returns have: else none would be equal to 0.7."""
-        return float(np.float32(super().threshold))
+        """The return that solves an episode, less a millionth of it: returns are summed in 32 bits."""
+        wanted = super().threshold
+        return wanted - 1e-6 * abs(wanted) if math.isfinite(wanted) else wanted
 
     @property
     def horizon(self) -> int:
