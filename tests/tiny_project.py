@@ -158,6 +158,7 @@ class Project:
     def __init__(self, pytester: pytest.Pytester, store: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setenv("COLUMNS", "160")  # so that no line of interest is wrapped
         monkeypatch.delenv("GITHUB_STEP_SUMMARY", raising=False)  # these verdicts are for no page
+        monkeypatch.setattr(sys, "dont_write_bytecode", True)  # two edits of one length in one second would share it
         self.pytester = pytester
         self.path = pytester.path
         self.store = store

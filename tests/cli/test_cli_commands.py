@@ -29,9 +29,8 @@ def test_run_runs_what_is_missing_and_lists_the_trials(evoclaims: Evoclaims) -> 
 
 
 def test_an_edited_method_of_the_same_revision_is_told_wherever_its_trials_count(
-    evoclaims: Evoclaims, project: Any, monkeypatch: pytest.MonkeyPatch
+    evoclaims: Evoclaims, project: Any
 ) -> None:
-    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # two edits in one second would share it
     project.write(a="undecided")
     told = "the code of tiny_paper.Coin was edited or renamed after trials had run, and they still count"
     paper = Path("tiny_paper.py")

@@ -85,9 +85,8 @@ def test_reference_says_which_claim_it_cannot_write_the_trials_of(evoclaims: Evo
 
 
 def test_committed_trials_of_another_revision_are_replaced_and_that_is_said(
-    evoclaims: Evoclaims, project: Project, monkeypatch: pytest.MonkeyPatch
+    evoclaims: Evoclaims, project: Project
 ) -> None:
-    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # two edits in one second would share it
     project.write(a="undecided")
     evoclaims("run", "coin")
     (wrote,) = [line for line in evoclaims("reference", "--unknown-revision")[1].splitlines() if "coin" in line]

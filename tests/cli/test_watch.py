@@ -66,8 +66,7 @@ def test_each_night_adds_an_entry_of_fresh_seeds(watching: Evoclaims, stored: St
     assert {"jax", "numpy"} <= second.versions.keys()
 
 
-def test_no_night_has_seeds_of_the_design(watching: Evoclaims, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # two edits in one second would share it
+def test_no_night_has_seeds_of_the_design(watching: Evoclaims) -> None:
     FILE.unlink()
     paper = Path("tiny_paper.py")
     design = "Design(looks=Design.fixed(10).looks, first_seed=9_991)"  # up to seed 10,000
@@ -97,7 +96,6 @@ def test_a_kill_in_a_night_repeats_nothing_and_counts_nothing_twice(
 def test_trials_of_a_killed_night_do_not_count_once_their_code_is_edited(
     evoclaims: Evoclaims, project: Project, stored: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # two edits in one second would share it
     project.write(a="undecided")
     assert evoclaims("run", "coin")[0] == 0
     references.write(COMMITTED.with_name("coin-parity.jsonl"), trials_of(stored, "coin"))
