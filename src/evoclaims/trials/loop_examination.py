@@ -20,7 +20,7 @@ from evoclaims.trials.loop_messages import Scores
 from evoclaims.trials.program import examine_every_level
 
 LOOKS: Final = 8
-"""Observations of a kind at which a policy is asked twice."""
+"""Least observations of a kind at which a policy is called on the host as well."""
 
 
 def examined(task: Task, policy: Callable[[Any], Any], seed: int) -> Scores:
@@ -79,8 +79,9 @@ def _fitted(task: Task, policy: Callable[[Any], Any]) -> Callable[[Array], Array
 
 def _act_alike(task: Task, one: Callable[[Array], Array], host: Callable[[Array], Any]) -> bool:
     """Whether a traced policy acts as on the host, at starts of each level and elsewhere."""
-    compiled, keys = jax.jit(one), jax.random.split(jax.random.key(0), LOOKS)
-    levels = jnp.arange(LOOKS, dtype=jnp.int32) % task.levels
+    count = max(LOOKS, task.levels)
+    compiled, keys = jax.jit(one), jax.random.split(jax.random.key(0), count)
+    levels = jnp.arange(count, dtype=jnp.int32) % task.levels
     with jax.default_matmul_precision(MATMUL_PRECISION):
         starts = jax.jit(jax.vmap(lambda key, level: task.reset(key, level).observation))(keys, levels)
         for observation in (*np.asarray(starts), *fixed_observations(task, LOOKS)):

@@ -122,7 +122,7 @@ LOOK_SECONDS: Final = 1.0
 when the process waits for another one that compiles the same kernel."""
 
 WAITS: Final = "\nevoclaims: interrupted; waiting for what is being computed. Ctrl-C again ends at once."
-"""What is said to the user where this takes longer than a look."""
+"""Printed after a Ctrl-C where the work takes longer than a look."""
 
 _working: weakref.WeakSet[Future[Any]] = weakref.WeakSet()
 """What all threads make; known before they start, since several interrupts may come at any time.

@@ -21,8 +21,8 @@ ARENA: Final = math.hypot(8.0, 8.0)
 """The diagonal of the paper's arena, m."""
 
 
-NOTHING: Final = 1e-6
-"""By how much a floor may be off, m or in its direction."""
+UNEVEN: Final = 1e-6
+"""A floor is level up to this height, m, and up to this difference of its normal from the vertical."""
 
 
 class Sensor(Protocol):
@@ -103,7 +103,7 @@ def _require_level_floor(scene: Scene) -> None:
     normals = np.zeros((len(planes), 3))
     for normal, plane in zip(normals, planes, strict=True):
         mujoco.mju_rotVecQuat(normal, np.array([0.0, 0.0, 1.0]), model.geom_quat[plane])
-    level = (np.abs(model.geom_pos[planes, 2]) < NOTHING) & (normals[:, 2] > 1.0 - NOTHING)
+    level = (np.abs(model.geom_pos[planes, 2]) < UNEVEN) & (normals[:, 2] > 1.0 - UNEVEN)
     if len(planes) and level.all():
         return
     found = "no floor" if not len(planes) else "a floor that is not level at z = 0"

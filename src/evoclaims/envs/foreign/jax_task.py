@@ -151,8 +151,8 @@ class Descriptor:
 class JaxTask(ForeignTask):
     """An environment in jax. A subclass has revision, `make`, `begin`, `advance` and `actions`.
 
-    A step after which a number is not finite is undone: no reward, and the episode ends, unsolved. If the action was
-    NaN, so is the reward, since the policy has diverged.
+    A step after which a number is not finite is undone: no reward, and the episode ends, unsolved. After an action
+    that is NaN the reward is NaN, and so is the return.
 
     Attributes:
         episode_steps: environment steps after which an episode is truncated.

@@ -65,7 +65,7 @@ class Equivalent(Assertion):
         if self.margin <= (apart := 2 * RESOLUTION * largest):  # each side may be moved by it
             raise UnreadableTrialError(
                 f"The margin {self.margin:g} of {self.describe()!r} cannot be judged: numbers as large as {largest:g} "
-                f"count as equal up to {apart:g}. Write a margin above that"
+                f"count as equal up to {apart:g}. Write a margin above that."
             )
         raised, lowered = _shifted(a, self.margin), _shifted(a, -self.margin)
         inside = equivalence_tests(a, b, self.margin)
