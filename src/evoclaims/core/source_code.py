@@ -66,7 +66,7 @@ def is_edited(then: str | None, now: str) -> bool:
 
 
 def _code(component: Any) -> Iterator[Any]:
-    """Yield the classes of a component and of the parts in its fields, and the loop or environment at its place."""
+    """Yield the classes of a component and of the parts in its fields, what is at its place, and its registration."""
     if type(component) in _WITHOUT_CODE:
         return
     if isinstance(component, Mapping):
@@ -79,6 +79,8 @@ def _code(component: Any) -> Iterator[Any]:
         yield type(component)
         if found := _at(component):
             yield found
+        if registered := _contents(getattr(component, "registered", None)):
+            yield f"the registration of {getattr(component, 'name', '')}", content_hash(registered)[:DIGITS]
         for field in dataclasses.fields(component):
             yield from _code(getattr(component, field.name))
 
@@ -147,9 +149,7 @@ def _hash(code: Any, parts: frozenset[type]) -> str:
 
     Fields of `parts`, the classes of the components with it, are in ids.
     """
-    code_found: dict[str, Any] = {}
-    arrays: dict[str, Any] = {}
-    objects: dict[str, Any] = {}
+    code_found, arrays, objects = dict[str, Any](), dict[str, Any](), dict[str, Any]()
     held, later = [code], list[Any]()
     found, contained = code_found, arrays
     while held or later:
@@ -377,8 +377,7 @@ def _as_lists(node: Any) -> Any:
 
 def _is_in_the_id(statement: ast.AnnAssign) -> bool:
     """Whether a class's annotated variable is a field, or a class variable that ids or versions hold."""
-    variable = "ClassVar" in ast.unparse(statement.annotation)
-    return not variable or ast.unparse(statement.target) in _IN_THE_ID
+    return "ClassVar" not in ast.unparse(statement.annotation) or ast.unparse(statement.target) in _IN_THE_ID
 
 
 def _named(tree: ast.Module, module: ModuleType) -> Iterator[tuple[str, Any, _Variable]]:

@@ -143,8 +143,26 @@ def test_the_class_of_a_user_s_own_environment_is_looked_at(maker: Any, monkeypa
     spec = gymnasium.envs.registration.EnvSpec("Own-v0", entry_point=maker)
     monkeypatch.setitem(gymnasium.registry, "Own-v0", spec)
     for name in ("Own-v0", f"{__name__}:Own-v0"):
-        assert list(code_of(GymnasiumTask(name))) == [f"{__name__}.Own"]
-    assert code_of(CART) == code_of(GymnasiumTask("CartPole-v9")) == {}
+        assert [*code_of(GymnasiumTask(name))] == [f"{__name__}.Own", "the registration of Own-v0"]
+    assert [*code_of(CART)] == ["the registration of CartPole-v1"]
+    assert code_of(GymnasiumTask("CartPole-v9")) == {}
+
+
+def test_what_an_environment_is_registered_with_is_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    def code_with(wrappers: Any = (), **registered: Any) -> Any:
+        maker: Any = Own
+        spec = gymnasium.envs.registration.EnvSpec("Own-v0", maker, additional_wrappers=wrappers, **registered)
+        monkeypatch.setitem(gymnasium.registry, "Own-v0", spec)
+        return code_of(GymnasiumTask("Own-v0"))
+
+    wrapper = gymnasium.envs.registration.WrapperSpec("Clipped", "some.module:Clipped", {"most": 1})
+    seen = [
+        code_with(kwargs=arguments, **limits)
+        for arguments in ({}, {"goal": 1.0}, {"goal": np.ones(2)}, {"goal": 1.0, "pay": max}, {"goal": Own()})
+        for limits in ({}, {"max_episode_steps": 9}, {"wrappers": (wrapper,)})
+    ]
+    assert len({code["the registration of Own-v0"] for code in seen}) == len(seen)
+    assert code_with(kwargs={"goal": np.ones(2)}) == seen[6]
 
 
 def test_a_method_that_is_compiled_says_what_to_do_instead(store_of: Store) -> None:

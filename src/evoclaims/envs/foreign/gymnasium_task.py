@@ -8,6 +8,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from types import NoneType
 from typing import Any, ClassVar, Final, NoReturn
 
 import gymnasium
@@ -71,6 +72,15 @@ class GymnasiumTask(ForeignTask):
             return place_of(gymnasium.spec(self.name).entry_point)
         except Exception:  # `make` says what is wrong
             return ""
+
+    @property
+    def registered(self) -> Mapping[str, Any]:
+        """The arguments, limit and wrappers that the environment is registered with; none where `make` says why."""
+        if not self.place:
+            return {}
+        spec = gymnasium.spec(self.name)
+        wrappers = [[one.entry_point, _plain(one.kwargs or {})] for one in spec.additional_wrappers]
+        return {"kwargs": _plain(spec.kwargs), "max_episode_steps": spec.max_episode_steps, "wrappers": wrappers}
 
     def make(self) -> Any:
         """Return a new environment; seed it by its `reset(seed=...)`.
@@ -139,6 +149,15 @@ class GymnasiumTask(ForeignTask):
         )
 
     step = episode = examine = reset
+
+
+def _plain(arguments: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return arguments that can be hashed: of functions and of objects where they, or their classes, are."""
+    held = NoneType, bool, int, float, str, tuple, list, dict, np.ndarray
+    return {
+        word: value if isinstance(value, held) else place_of(value if callable(value) else type(value))
+        for word, value in arguments.items()
+    }
 
 
 def _size(space: Any) -> int:
