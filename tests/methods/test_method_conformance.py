@@ -12,7 +12,6 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from small_methods import METHODS, Entry
-from usual_fusions import USUAL_FUSIONS
 from workbench import Workbench, close, same_bits
 
 import evoclaims.methods
@@ -71,7 +70,7 @@ def test_another_key_gives_another_state_where_a_method_learns(entry: Entry, ben
 @pytest.mark.newest  # smoke compiles each method's trials side by side
 def test_trials_side_by_side_in_a_loop_are_the_trials_one_by_one(bench: Workbench) -> None:
     seeds = (3, 8)
-    alone = [bench.run(1, seed=seed, usual=True)[0] for seed in seeds]
+    alone = [bench.run(1, seed=seed)[0] for seed in seeds]
     keys = jnp.stack([jax.random.key(seed + 1) for seed in seeds])
     starts = jax.tree.map(lambda *leaf: jnp.stack(leaf), *[bench.init(seed) for seed in seeds])
 
@@ -82,7 +81,7 @@ def test_trials_side_by_side_in_a_loop_are_the_trials_one_by_one(bench: Workbenc
 
         return jax.lax.while_loop(lambda carry: carry[0] < steps, body, (LEVEL, state))[1]
 
-    side_by_side = jax.jit(jax.vmap(trial, in_axes=(0, None, 0)), compiler_options=USUAL_FUSIONS)
+    side_by_side = jax.jit(jax.vmap(trial, in_axes=(0, None, 0)))
     with jax.debug_key_reuse(False):  # jax takes the keys of any loop under vmap for used
         together = side_by_side(keys, jnp.int32(1), starts)
     for i, one in enumerate(alone):
