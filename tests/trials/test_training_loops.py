@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -199,6 +200,16 @@ def test_a_report_is_checked_however_soon_it_comes_after_another() -> None:
         report(250.5)  # type: ignore[arg-type]
     report(np.float32(250.0))  # type: ignore[arg-type]
     assert report.last == 250
+
+
+@pytest.mark.parametrize("budget", [Budget(environment_steps=100), Budget(generations=100)])
+def test_a_loop_that_returns_fewer_steps_than_it_reported_is_a_crash_that_says_so(
+    store: Store, cpus: list[Any], budget: Budget
+) -> None:
+    counting = replace(condition(toy_loops.counts_less), budget=budget)
+    less, as_many = run(counting, range(2), store, cpus)
+    assert (less.status, as_many.status, as_many.metrics["steps"]) == ("crashed", "done", 50)
+    assert "steps and has reported 50. Return all that it has made, or leave the metric out" in failed.why(less)
 
 
 def test_threads_of_a_loop_report_without_mixing_their_lines(store: Store, cpus: list[Any]) -> None:

@@ -89,6 +89,12 @@ def in_odd_ways(task: Any, seed: int, budget: Any, report: Callable[..., None], 
     return {"a name that is no \udc80 text": 1.0} if seed == 3 else {"read": float(input())}
 
 
+def counts_less(task: Any, seed: int, budget: Any, report: Callable[..., None]) -> Mapping[str, float]:
+    """Return fewer steps than it has reported (seed 0), or as many."""
+    report(50, fitness=1.0)
+    return {("steps" if budget.generations else "environment_steps"): 49.0 + seed, "last_fitness": 1.0}
+
+
 def from_threads(task: Any, seed: int, budget: Any, report: Callable[..., None]) -> Mapping[str, float]:
     """Report long lines from several threads at once."""
     numbers = {f"number {n}": float(n) for n in range(800)}

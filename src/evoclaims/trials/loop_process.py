@@ -143,6 +143,12 @@ def train(request: LoopRequest, answer: Callable[[Answer], None]) -> Trained:
     returned = function(task, request.seed, budget, **from_plain(request.settings), **given)
     metrics, policy = returned if isinstance(returned, tuple) and len(returned) == 2 else (returned, None)
     told_metrics = numbers(metrics)
+    counted = "environment_steps" if budget.generations is None else "steps"
+    if told_metrics.get(counted, math.inf) < (report.last or 0):
+        raise UserError(
+            f"A training function returns {told_metrics[counted]:.0f} {counted} and has reported {report.last}. Return "
+            "all that it has made, or leave the metric out: the last report counts then."
+        )
     if policy is not None and not callable(policy):
         raise UserError(f"A policy is {policy!r}. It must be a function from an observation to an action.")
     if policy is None:
