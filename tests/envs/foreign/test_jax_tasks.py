@@ -180,6 +180,23 @@ def test_a_policy_that_answers_nan_solves_nothing(actions: Choice | Range) -> No
         assert (np.isnan(fitness), success) == (True, 0.0)
 
 
+def test_to_break_an_environment_that_costs_pays_no_more_than_its_worst_step_ever_after() -> None:
+    class Breaking(BraxTask):
+        def begin(self, key: Any) -> Any:
+            return replace(super().begin(key), state=jnp.int32(0))
+
+        def advance(self, key: Any, state: Any, action: Any) -> Any:
+            paid = jnp.array([0.5, -3.0, -1.0, jnp.nan])[state]
+            return Moment(state=state + 1, observation=jnp.zeros(2), reward=paid, terminated=jnp.zeros((), bool))
+
+    task = Breaking("fast", episode_steps=12, examined_episodes=2, solved_at=-5)
+    compiled = task.examine(lambda observation: jnp.zeros(1), jax.random.key(0), jnp.int32(0))
+    fitness, success, metrics = task.examine_natively(lambda observation: np.zeros(1), 0)
+    assert fitness == 0.5 - 3.0 - 1.0 - 3.0 * 9 == compiled.fitness
+    assert success == 0.0 == compiled.success
+    assert metrics == {"episode_steps": 4.0} == compiled.metrics
+
+
 def test_a_return_that_32_bits_make_smaller_solves_an_episode() -> None:
     class Hundredths(BraxTask):
         def begin(self, key: Any) -> Any:

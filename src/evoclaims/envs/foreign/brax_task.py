@@ -30,7 +30,7 @@ class BraxTask(JaxTask):
         settings: its further arguments.
     """
 
-    revision: ClassVar[int] = 3
+    revision: ClassVar[int] = 4
     packages: ClassVar[tuple[str, ...]] = ("brax", "mujoco", "mujoco-mjx")
 
     settings: Mapping[str, Any] = field(default_factory=dict, hash=False, kw_only=False)

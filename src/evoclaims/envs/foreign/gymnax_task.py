@@ -25,7 +25,7 @@ class GymnaxTask(JaxTask):
         parameters: fields of the environment's parameters that differ from the default.
     """
 
-    revision: ClassVar[int] = 4
+    revision: ClassVar[int] = 5
     packages: ClassVar[tuple[str, ...]] = ("gymnax",)
 
     parameters: Mapping[str, Any] = field(default_factory=dict, hash=False, kw_only=False)

@@ -109,12 +109,14 @@ class Inner:
         state: the environment's own.
         key: data of the key that the next step's key derives from; keys themselves are no arrays.
         time: environment steps made.
+        worst: the lowest reward so far, or 0 if none was below.
         sound: whether all numbers were finite.
     """
 
     state: Any
     key: Array
     time: Int[Array, ""]
+    worst: Float[Array, ""]
     sound: Bool[Array, ""]
 
 
@@ -151,8 +153,9 @@ class Descriptor:
 class JaxTask(ForeignTask):
     """An environment in jax. A subclass has revision, `make`, `begin`, `advance` and `actions`.
 
-    A step after which a number is not finite is undone: no reward, and the episode ends, unsolved. After an action
-    that is NaN the reward is NaN, and so is the return.
+    A step after which a number is not finite is undone, and the episode ends, unsolved. If it had rewards below 0, it
+    is paid the lowest of them for each step that it lacks, else nothing: to break an environment never pays. After an
+    action that is NaN the reward is NaN, and so is the return.
 
     Attributes:
         episode_steps: environment steps after which an episode is truncated.
@@ -217,7 +220,7 @@ class JaxTask(ForeignTask):
             moment = self.begin(begin_key)
         no = jnp.zeros((), bool)
         time, key_data = jnp.zeros((), jnp.int32), jax.random.key_data(later_key)
-        inner = Inner(state=moment.state, key=key_data, time=time, sound=~no)
+        inner = Inner(state=moment.state, key=key_data, time=time, worst=jnp.zeros(()), sound=~no)
         return TaskState(
             observation=_flat(moment.observation),
             reward=jnp.zeros(()),
@@ -233,12 +236,13 @@ class JaxTask(ForeignTask):
         numbers = fitting(self, action)
         with implicit_promotions():
             found = self.advance(step_key, inner.state, self.actions.chosen(numbers))
-        moment, sound = self._ruled(found, inner.time + 1, jnp.any(jnp.isnan(numbers)))
+        moment, sound = self._ruled(found, inner.time + 1, inner.worst, jnp.any(jnp.isnan(numbers)))
         reached = strong(
             Inner(
                 state=select(sound, moment.state, inner.state),
                 key=jax.random.key_data(later_key),
                 time=inner.time + 1,
+                worst=jnp.minimum(inner.worst, moment.reward),
                 sound=sound,
             )
         )
@@ -250,17 +254,20 @@ class JaxTask(ForeignTask):
             inner=reached,
         )
 
-    def _ruled(self, moment: Moment, steps: Int[Array, ""], lost: Bool[Array, ""]) -> tuple[Moment, Bool[Array, ""]]:
+    def _ruled(
+        self, moment: Moment, steps: Int[Array, ""], worst: Float[Array, ""], lost: Bool[Array, ""]
+    ) -> tuple[Moment, Bool[Array, ""]]:
         """Return what counts of the moment after some steps, and whether its numbers are finite.
 
-        Where the policy was `lost`, its action was no number.
+        `worst` is that of the steps before. Where the policy was `lost`, its action was no number.
 
         Each examination follows this rule, so that a policy scores the same whatever has trained it.
         """
         sound = jnp.all(jnp.isfinite(_flat(moment.observation))) & jnp.isfinite(moment.reward) & ~lost
         terminated = moment.terminated | ~sound
         truncated = (moment.truncated | (steps >= self.episode_steps)) & ~terminated
-        reward = jnp.where(sound, moment.reward, jnp.where(lost, jnp.nan, 0.0))
+        instead = jnp.where(lost, jnp.nan, worst * (self.episode_steps + 1 - steps).astype(jnp.float32))
+        reward = jnp.where(sound, moment.reward, instead)
         return replace(moment, reward=reward, terminated=terminated, truncated=truncated), sound
 
     def episode(self, policy: PolicyFn, key: PRNGKeyArray, level: Int[Array, ""]) -> Episode:
@@ -307,17 +314,18 @@ class JaxTask(ForeignTask):
             return array_action(actions.shape, action, self.name)
 
         @jax.jit
-        def advance(key: Array, state: Any, action: Array, steps: Array) -> tuple[Moment, Bool[Array, ""]]:
-            return self._ruled(self.advance(key, state, action), steps, jnp.any(jnp.isnan(action)))
+        def advance(key: Array, state: Any, action: Array, steps: Array, worst: Array) -> tuple[Moment, Array]:
+            return self._ruled(self.advance(key, state, action), steps, worst, jnp.any(jnp.isnan(action)))
 
         def one(key: Array) -> tuple[float, int, bool]:
             key, begin_key = jax.random.split(key)
-            moment, total = begin(begin_key), np.float32(0.0)
+            moment, total, worst = begin(begin_key), np.float32(0.0), np.float32(0.0)
             for step in count(1):
                 key, step_key = jax.random.split(key)
                 action = jnp.asarray(native(policy(np.asarray(moment.observation))))
-                moment, sound = advance(step_key, moment.state, action, np.int32(step))
+                moment, sound = advance(step_key, moment.state, action, np.int32(step), worst)
                 total += np.float32(moment.reward)
+                worst = min(worst, np.float32(moment.reward))
                 if moment.terminated or moment.truncated:
                     break
             return float(total), step, bool(sound)
