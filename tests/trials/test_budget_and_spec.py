@@ -20,7 +20,7 @@ from evoclaims.methods.cma_es import CmaEs
 from evoclaims.methods.hand_built import HandBuilt
 from evoclaims.methods.neat.evolution import Neat
 from evoclaims.methods.neat.settings import Attribute, Mutation, Settings
-from evoclaims.methods.ppo import Ppo
+from evoclaims.methods.ppo import LevelTest, Ppo
 from evoclaims.methods.random_search import RandomSearch
 from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.networks.all_skips import AllSkips
@@ -274,3 +274,14 @@ def test_environment_steps_that_no_float_counts_are_a_sentence(monkeypatch: pyte
     with pytest.raises(UserError, match=r"18014398509481984 environment steps \(4 steps of 4503599627370496\)"):
         _ = condition.environment_steps
     assert Budget(generations=2).steps(2**52) * 2**52 == 2**53
+
+
+@pytest.mark.parametrize(("every", "what"), [(5, "after each 5 whether it moves up"), (0, "nothing")])
+def test_a_curriculum_that_is_never_tested_is_a_sentence(every: int, what: str) -> None:
+    """It would say that the method stays at the first level, whatever it learns."""
+    seldom = replace(CONDITION, method=Ppo(level_test=LevelTest(every=every)))
+    with pytest.raises(UserError, match=f"a curriculum of 4 steps, and ppo tests {what}: it would stay at the first"):
+        _ = seldom.steps
+    assert replace(seldom, progression="whole_budget").steps == 4
+    assert replace(seldom, method=Ppo(level_test=LevelTest(every=4))).steps == 4
+    assert replace(seldom, task=SteppingStones()).steps == 4

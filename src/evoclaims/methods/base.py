@@ -98,6 +98,15 @@ class Resizable(Protocol):
 
 
 @runtime_checkable
+class SeldomTested(Protocol):
+    """A method that reports a success above 0 after some of its steps alone."""
+
+    @property
+    def tested_every(self) -> int:
+        """Steps from one report of success to the next; 0: none is reported."""
+
+
+@runtime_checkable
 class PartlyUsed(Protocol):
     """A method whose policies do not use all their parameters: some are padding, or only stored with the champion.
 

@@ -209,6 +209,11 @@ class Ppo:
 
         return Policy(parameters=(state.statistics, state.networks.policy), function=function)
 
+    @property
+    def tested_every(self) -> int:
+        """Training steps from one test to the next; 0: there are none."""
+        return self.level_test.every
+
     def cost(self, task: Task) -> int:
         """Return the environment steps collected in one training step."""
         return self.batch_size * self.minibatches * self.unroll_length

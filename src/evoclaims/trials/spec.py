@@ -14,7 +14,7 @@ from evoclaims.core.errors import UserError, require_known
 from evoclaims.core.packages import ALWAYS, installed, packages_of
 from evoclaims.core.source_code import CODE, code_of, is_edited
 from evoclaims.envs.base import Task
-from evoclaims.methods.base import Method
+from evoclaims.methods.base import Method, SeldomTested
 from evoclaims.methods.training_loop import TrainingLoop
 from evoclaims.trials.budget import Budget
 from evoclaims.trials.result import TrialResult
@@ -205,7 +205,8 @@ class Condition:
         """Steps of the method in the whole budget.
 
         Raises:
-            UserError: when there are more than counters hold: 32-bit integers on devices, and floats in records.
+            UserError: when there are more than counters hold: 32-bit integers on devices, and floats in records; or
+                fewer than the method makes before it tests whether it may move up a level.
         """
         steps = self.budget.steps(self.cost)
         if steps >= 2**31 and self.loop is None:
@@ -218,6 +219,13 @@ class Condition:
                 f"{self.label} has a budget of {steps * self.cost} environment steps ({steps} steps of "
                 f"{self.cost}), and a trial takes at most 2^53 = {2**53}. Make the budget or the cost of "
                 "a step smaller."
+            )
+        every = self.method.tested_every if isinstance(self.method, SeldomTested) else 1
+        if self.progression == "curriculum" and self.task.levels > 1 and not 0 < every <= steps:
+            raise UserError(
+                f"{self.label} is a curriculum of {steps} steps, and {self.method.name} tests "
+                f"{f'after each {every} whether it moves up' if every else 'nothing'}: it would stay at the first "
+                "level. Let it test more often, or choose another progression."
             )
         return steps
 
