@@ -132,3 +132,5 @@ def test_a_claim_on_which_nothing_was_tried_keeps_its_row() -> None:
     nothing = replace(BEFORE, attempts=())
     assert merged({KEY: BEFORE}, {KEY: nothing}, "smoke", BOTH)[KEY].attempts == BEFORE.attempts
     assert merged({}, {KEY: nothing}, "smoke", BOTH) == {}
+    other = replace(nothing, outcome=Outcome.REFUTED)  # a row of another outcome would be shown and scored
+    assert merged({KEY: BEFORE}, {KEY: other}, "smoke", BOTH) == {}

@@ -12,6 +12,7 @@ from evoclaims.core.errors import UserError
 from evoclaims.judging.verdict import Outcome
 from evoclaims.verdicts.claim_report import Tried
 from evoclaims.verdicts.mutation_matrix import (
+    COPIES,
     Attempt,
     Fate,
     Matrix,
@@ -71,6 +72,8 @@ BLIND = attempt("blind", Fate.KILLED, "maze", "task")
         (row(BLIND, untried=("neat: a",)), Tried.NOT_TRIED),
         (row(a=Fate.SURVIVED, untried=("neat: b",)), Tried.NOT_TRIED),
         (row(a=Fate.KILLED, untried=("neat: b",)), Tried.SENSITIVE),
+        (row(attempt(COPIES, Fate.KILLED), a=Fate.SURVIVED), Tried.INSENSITIVE),  # copies end any claim
+        (row(attempt(COPIES, Fate.KILLED)), Tried.NOT_TRIED),
     ],
 )
 def test_a_claim_is_insensitive_when_no_fault_of_its_methods_changes_it(one: Sensitivity, found: Tried) -> None:
@@ -78,7 +81,8 @@ def test_a_claim_is_insensitive_when_no_fault_of_its_methods_changes_it(one: Sen
 
 
 def test_a_method_is_unnoticed_when_none_of_its_own_mutants_has_changed_the_verdict() -> None:
-    attempts = (attempt("minimizes", Fate.KILLED), attempt("minimizes", Fate.SURVIVED, "ppo"), BLIND)
+    own = attempt("minimizes", Fate.KILLED), attempt("minimizes", Fate.SURVIVED, "ppo")
+    attempts = *own, attempt(COPIES, Fate.KILLED, "ppo"), BLIND
     assert Sensitivity(SUPPORTED, "", ("neat", "ppo", "cma_es"), attempts).unnoticed == ("ppo", "cma_es")
 
 
@@ -101,7 +105,8 @@ def test_a_row_is_about_a_verdict_of_the_same_conditions_rules_and_outcome_and_n
     ):
         assert tried(matrix, other) is Tried.NOT_TRIED
         assert described(matrix, other) == NOT_TRIED
-    assert described({("smoke", "A"): row(a=Fate.KILLED)}, judged) == "Planted faults: 1 of 1 change this verdict."
+    noticed = row(attempt(COPIES, Fate.KILLED), a=Fate.KILLED)
+    assert described({("smoke", "A"): noticed}, judged) == "Planted faults: 1 of 1 change this verdict."
     assert described({("smoke", "A"): row(untried=("a",))}, judged) == NOT_TRIED
 
 

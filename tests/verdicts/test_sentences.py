@@ -26,6 +26,12 @@ def test_a_sentence_with_the_assertion_of_an_earlier_one_counts_once() -> None:
     assert [(one.claim, one.same_as) for one in found] == [("S4", ()), ("S8", ("S4[b]",))]
 
 
+def test_a_sentence_that_ends_otherwise_than_one_of_its_assertion_counts_by_itself() -> None:
+    """Another function under the same name, or a further look: nothing refuted is left out of the count."""
+    found = sentences([report("P3", asserts="same", line=1), report("P4", "refuted", asserts="same", line=2)])
+    assert [(one.outcome, one.same_as) for one in found] == [(Tally.SUPPORTED, ()), (Tally.REFUTED, ())]
+
+
 def test_a_sentence_that_the_part_of_an_earlier_one_refutes_counts_once() -> None:
     same, other = _refuted("D4", "x in most trials", 9), _refuted("D5", "y in most trials", 10)
     found = sentences([same, other, _refuted("S7", "x in most trials", 5)])

@@ -131,7 +131,7 @@ def _curves(report: ClaimReport, names: Names) -> tuple[str, ...]:
 def merged(before: Matrix, now: Matrix, tier: str, applicable: Mapping[tuple[str, str], Collection[str]]) -> Matrix:
     """Return a matrix where new attempts replace old ones, and what no longer applies is left out.
 
-    Old attempts stay while their claim is unchanged.
+    Old attempts stay while their claim is unchanged; without new ones a claim that has changed has no row.
 
     Args:
         before: all tiers.
@@ -142,7 +142,9 @@ def merged(before: Matrix, now: Matrix, tier: str, applicable: Mapping[tuple[str
     rows = {key: row for key, row in before.items() if key[0] != tier or key in applicable}
     for key, row in now.items():
         old, attempts = before.get(key), {attempt.name: attempt for attempt in row.attempts}
-        if old is not None and (old.fingerprint, old.outcome) == (row.fingerprint, row.outcome):
+        if old is not None and (old.fingerprint, old.outcome) != (row.fingerprint, row.outcome):
+            rows.pop(key, None)
+        elif old is not None:
             attempts = {attempt.name: attempt for attempt in old.attempts} | attempts
         known = {name: attempts[name] for name in applicable[key] if name in attempts}
         if known:

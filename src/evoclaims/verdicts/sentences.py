@@ -55,10 +55,10 @@ def sentences(reports: Iterable[ClaimReport]) -> tuple[Sentence, ...]:
 
 
 def _results(report: ClaimReport) -> tuple[tuple[str, ...], ...]:
-    """Return what a case has in common with one of the same result: its assertion, or the part that refuted it."""
+    """Return what cases of one result have in common: assertion and outcome, or the part that refuted them."""
     part = report.verdict.deciding_part if report.verdict else None
     refuted = ((str(report.outcome), part.describe),) if report.outcome is Outcome.REFUTED and part else ()
-    return ((report.asserts,), *refuted) if report.asserts else refuted
+    return ((report.asserts, str(report.outcome)), *refuted) if report.asserts else refuted
 
 
 @dataclass(frozen=True)
