@@ -12,9 +12,9 @@ import pytest
 from chromium import NAMES, Chromium, found
 from laboratory import Laboratory, better_solves, better_wins
 
-from evoclaims.judging.verdict import Outcome
 from evoclaims.report.html import html
 from evoclaims.report.model import PaperFigure
+from evoclaims.verdicts.claim_report import Tally
 from evoclaims.verdicts.transitions import Robustness
 
 PLATE = (
@@ -74,7 +74,7 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> str:
     reports.append(empty.judge(better_solves, id="C1", where="control"))
     sentences = {report.name: report.statement for report in reports if report.tier == "full"}
     page = lab.page(*reports, figures=[PaperFigure("Fig. 3", "says", PLATE)], sentences=sentences)
-    row = Robustness("G1", "full", Outcome.SUPPORTED, {"network": Outcome.REFUTED})
+    row = Robustness("G1", "full", Tally.SUPPORTED, {"network": Tally.REFUTED})
     page = replace(page, robustness=(row,), variants={"network": "another network"})
     path = folder / "index.html"
     path.write_text(html(page), encoding="utf-8")

@@ -12,7 +12,7 @@ from evoclaims.report.charts import SPARK_WIDTH as WIDTH
 from evoclaims.report.charts import spark_svg
 from evoclaims.report.evidence import Dot, Part, Strip
 from evoclaims.report.html import findings, opening_lines
-from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.claim_report import ClaimReport, Tally
 from evoclaims.verdicts.transitions import Robustness
 
 
@@ -46,7 +46,7 @@ def test_a_sentence_has_one_line_with_its_cases_at_every_tier(filled: Laboratory
 
 def test_a_line_tells_what_came_of_each_case_under_each_variant(filled: Laboratory) -> None:
     page = filled.page(filled.judge(better_wins), filled.judge(better_solves, id="T2"))
-    row = Robustness("T1", "full", Outcome.SUPPORTED, {"network": Outcome.REFUTED, "rows": Outcome.SUPPORTED})
+    row = Robustness("T1", "full", Tally.SUPPORTED, {"network": Tally.REFUTED, "rows": Tally.SUPPORTED})
     shown = replace(page, robustness=(row,), variants={"network": "x", "rows": "y", "z": "z"})
     first, second = opening_lines(shown)
     assert list(map(shown.protocols, page.sections)) == ["refuted under network; supported under rows", ""]

@@ -7,13 +7,13 @@ from dataclasses import replace
 from hand_made_verdicts import report
 from unpacked import whole
 
-from evoclaims.judging.verdict import Outcome
 from evoclaims.report.html import html
 from evoclaims.report.model import Board, Page, Section
+from evoclaims.verdicts.claim_report import Tally
 from evoclaims.verdicts.transitions import Robustness
 
-ROW = Robustness("G1[<b>]", "smoke", Outcome.REFUTED, {"network": Outcome.SUPPORTED, "rows": Outcome.REFUTED})
-OTHER = Robustness("G2", "smoke", Outcome.SUPPORTED, {"rows": Outcome.SUPPORTED})
+ROW = Robustness("G1[<b>]", "smoke", Tally.REFUTED, {"network": Tally.SUPPORTED, "rows": Tally.REFUTED})
+OTHER = Robustness("G2", "smoke", Tally.SUPPORTED, {"rows": Tally.SUPPORTED})
 PAGE = Page(
     title="A Paper",
     name="paper",
@@ -33,12 +33,12 @@ def test_the_page_sets_off_what_hangs_on_a_detail() -> None:
 
 
 def test_a_verdict_stands_out_from_no_protocol_that_has_not_run() -> None:
-    alone = replace(PAGE, robustness=(Robustness("G3", "full", Outcome.NOT_RUN, {"rows": Outcome.REFUTED}),))
+    alone = replace(PAGE, robustness=(Robustness("G3", "full", Tally.NOT_RUN, {"rows": Tally.REFUTED}),))
     assert "<b>refuted</b>" not in whole(alone)
 
 
 def test_the_heading_of_a_variant_is_shown_whole() -> None:
     board = Board("smoke", (Section(report("G1"), "G1", (), ("§1",)),))
-    row = Robustness("G1", "smoke", Outcome.SUPPORTED, {"large_<network>": Outcome.SUPPORTED})
+    row = Robustness("G1", "smoke", Tally.SUPPORTED, {"large_<network>": Tally.SUPPORTED})
     page = replace(PAGE, boards=(board,), variants={"large_<network>": "a larger one"}, robustness=(row,))
     assert '<span class="variant" title="a larger one">large_&lt;network&gt;</span>' in html(page)

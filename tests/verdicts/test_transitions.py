@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from evoclaims.core.errors import UserError
 from evoclaims.judging.verdict import Outcome, Verdict
-from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.claim_report import ClaimReport, Tally
 from evoclaims.verdicts.transitions import (
     Kind,
     Standing,
@@ -174,3 +174,14 @@ def test_a_variant_that_is_inconclusive_with_fewer_trials_says_nothing_of_the_de
     assert row.hangs_on == ("x",)
     (row,) = matrix([judged(Outcome.INCONCLUSIVE, 30)], {"x": [undecided]})
     assert (row.hangs_on, row.fewer) == ((), frozenset())
+
+
+def test_support_that_a_null_agent_has_too_is_no_plain_support_under_a_variant() -> None:
+    plain, vacuous = (
+        _report("A", Outcome.REFUTED),
+        replace(_report("A", Outcome.SUPPORTED), satisfied_by=("no action",)),
+    )
+    (row,) = matrix([plain], {"x": [replace(vacuous, variant="x")], "y": [_report("A", Outcome.SUPPORTED, "y")]})
+    assert (row.plain, row.outcomes) == (Tally.REFUTED, {"x": Tally.VACUOUS, "y": Tally.SUPPORTED})
+    (row,) = matrix([vacuous], {"y": [_report("A", Outcome.SUPPORTED, "y")]})
+    assert (row.plain, row.hangs_on) == (Tally.VACUOUS, ("y",))

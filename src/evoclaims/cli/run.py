@@ -13,7 +13,6 @@ from evoclaims.core.errors import UserError
 from evoclaims.execution.job import Job
 from evoclaims.execution.worker import WorkOrder
 from evoclaims.judging.exact import MAX_TRIALS
-from evoclaims.judging.verdict import Outcome
 from evoclaims.paper import references
 from evoclaims.paper.cost import Estimator, Wanted
 from evoclaims.paper.reproduction import Names
@@ -27,6 +26,7 @@ from evoclaims.trials.result import COMPLETE
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import Store
 from evoclaims.verdicts import other_code
+from evoclaims.verdicts.claim_report import Tally
 from evoclaims.verdicts.transitions import matrix
 
 
@@ -125,7 +125,7 @@ def _print_matrix(project: Project, tier: str, variant: str) -> None:
             outcomes = f"{row.plain} -> {outcome}" if name in row.hangs_on else f"{outcome} either way"
             if name in row.fewer:
                 outcomes = f"{outcome} with fewer trials than decide the protocol's own verdict, {row.plain}"
-            if row.plain is Outcome.NOT_RUN:
+            if row.plain is Tally.NOT_RUN:
                 outcomes = f"{outcome}; not run under the protocol itself"
             print(f"  {row.claim}: {outcomes}")
     if not rows:

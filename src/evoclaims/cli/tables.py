@@ -33,14 +33,13 @@ from evoclaims.cli.terminal import write
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.files import read_text
 from evoclaims.figures.replication import replications
-from evoclaims.judging.verdict import Outcome
 from evoclaims.paper.reported import uncovered
 from evoclaims.report import replication_cells, verdict_overview, vocabulary
 from evoclaims.report.formatting import literal, plural, table
 from evoclaims.report.table_cells import NONE
 from evoclaims.report.trial_summary import Reader
 from evoclaims.report.verdict_overview import by_sentence, marks, overview, short_sentences, tally
-from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.claim_report import ClaimReport, Tally
 from evoclaims.verdicts.sentences import sentences
 from evoclaims.verdicts.transitions import Robustness, matrix
 
@@ -184,8 +183,8 @@ def _details(project: Project, words: list[str], *_: str) -> str:
 
 def _refutations(project: Project, words: list[str], *_: str) -> str:
     rows, variants = _under_variants(project, _tier(project, words))
-    refuted = [row for row in rows if row.plain is Outcome.REFUTED and row.hangs_on]
-    others = [one for one in Outcome if any(row.outcomes[name] is one for row in refuted for name in row.hangs_on)]
+    refuted = [row for row in rows if row.plain is Tally.REFUTED and row.hangs_on]
+    others = [one for one in Tally if any(row.outcomes[name] is one for row in refuted for name in row.hangs_on)]
     cells = {
         name: [
             ", ".join(row.claim for row in refuted if name in row.hangs_on and row.outcomes[name] is other)

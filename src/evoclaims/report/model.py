@@ -232,7 +232,7 @@ class Page:
     def protocols(self, section: Section) -> str:
         """Return how a claim ends under the variants of the protocol; empty where it was judged under none."""
         key = section.report.name, section.report.tier
-        found: defaultdict[Outcome, list[str]] = defaultdict(list)
+        found: defaultdict[Tally, list[str]] = defaultdict(list)
         for row in self.robustness:
             for variant, outcome in row.outcomes.items() if (row.claim, row.tier) == key else ():
                 found[outcome].append(variant)

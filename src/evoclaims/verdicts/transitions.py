@@ -11,7 +11,7 @@ from typing import Final
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.printable import printable
 from evoclaims.judging.verdict import Outcome
-from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.claim_report import ClaimReport, Tally
 from evoclaims.verdicts.history import History, in_order, key_of
 
 ANY: Final = "*"
@@ -162,17 +162,18 @@ class Robustness:
     Attributes:
         claim: id and parameters, such as "G1[n_parity]".
         tier: "smoke" or "full".
-        plain: the verdict under the protocol itself.
-        outcomes: by variant; a variant that changes none of the claim's trials, or whose trials have not run, is left
-            out.
+        plain: what the claim counts as under the protocol itself. Support is vacuous here as elsewhere, but never
+            insensitive: planted faults are not tried under variants.
+        outcomes: the same by variant; a variant that changes none of the claim's trials, or whose trials have not run,
+            is left out.
         fewer: variants that are inconclusive with fewer trials than have decided the protocol's verdict: that may be
             for want of trials.
     """
 
     claim: str
     tier: str
-    plain: Outcome
-    outcomes: Mapping[str, Outcome]
+    plain: Tally
+    outcomes: Mapping[str, Tally]
     fewer: frozenset[str] = frozenset()
 
     @property
@@ -181,7 +182,7 @@ class Robustness:
 
         None where the protocol itself has not run.
         """
-        if self.plain is Outcome.NOT_RUN:
+        if self.plain is Tally.NOT_RUN:
             return ()
         return tuple(name for name, one in self.outcomes.items() if one != self.plain and name not in self.fewer)
 
@@ -199,6 +200,10 @@ def matrix(plain: Sequence[ClaimReport], variants: Mapping[str, Sequence[ClaimRe
         varied = {name: found[key] for name in variants if (key := (report.tier, report.name, name)) in found}
         undecided = {name: one.n for name, one in varied.items() if one.outcome is Outcome.INCONCLUSIVE}
         fewer = {name for name, n in undecided.items() if report.outcome is not Outcome.INCONCLUSIVE and n < report.n}
-        outcomes = {name: one.outcome for name, one in varied.items()}
-        rows.append(Robustness(report.name, report.tier, report.outcome, outcomes, frozenset(fewer)))
+        outcomes = {name: _counted(one) for name, one in varied.items()}
+        rows.append(Robustness(report.name, report.tier, _counted(report), outcomes, frozenset(fewer)))
     return tuple(row for row in rows if row.outcomes)
+
+
+def _counted(report: ClaimReport) -> Tally:
+    return Tally.VACUOUS if report.is_vacuous else Tally(report.outcome.value)
