@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from tiny_project import Evoclaims, aged, forget, out_of_time, spoiled, trials_of
 
+from evoclaims.core.canonical import content_hash
 from evoclaims.judging.verdict import Outcome
 from evoclaims.paper import references
 from evoclaims.trials.result import TrialResult, digest
@@ -87,6 +88,20 @@ def test_new_trials_that_drifted_from_the_references_are_said(evoclaims: Evoclai
     assert "to the bit: 10 trials compared, 10 changed" in out
     assert "  CHANGED in smoke/right-parity: seeds 0, 1, 2, 3, 4, 5, 6, 7, 8, 9\n" in out
     assert "trials of the new side alone: smoke/wrong-parity" in out
+
+
+def test_trials_that_no_verdict_looks_at_hide_no_drift(evoclaims: Evoclaims) -> None:
+    """Fifty of a pilot, which are as the reference trials are."""
+    own = trials_of(Store(OWN), "hand_built")
+    path = references.path_of(Path("reference"), "smoke", "right", "parity")
+    references.write(path, map(spoiled, own))
+    for seed in range(100, 150):
+        spec = {**own[0].spec, "seed": seed}
+        Store(OWN).put(replace(spoiled(own[0]), id=content_hash(spec), spec=spec, seed=seed, champion=""), {})
+    evoclaims("accept", "--tier=smoke")
+    _, out, _ = evoclaims("compare", "--tier=smoke")
+    assert "  DRIFT in smoke/right-parity: mean_success is " in out
+    assert "to the bit: 10 trials compared, 10 changed" in out
 
 
 def test_methods_whose_names_begin_alike_before_a_dash_are_tested_each_for_itself(evoclaims: Evoclaims) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path, PurePosixPath
 from evoclaims.core.packages import Versions, depends_on
 from evoclaims.judging.drift_report import DigestCheck, DriftReport
 from evoclaims.paper import references
-from evoclaims.paper.archive import Archive, names_of
+from evoclaims.paper.archive import Archive, Name, names_of
 from evoclaims.paper.reproduction import Reproduction
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.store import DamagedFileError
@@ -82,7 +82,10 @@ def store(reproduction: Reproduction, archive: Archive, reports: Iterable[ClaimR
         condition: reproduction.tier(known[0].tier, known[0].variant).condition(known[0].method, known[0].task).versions
         for condition, known in names.items()
     }
-    found = {record.id: record.condition for record in archive.store.results(damaged) if record.condition in names}
+    seeds = {condition: _seeds(reproduction, known) for condition, known in names.items()}
+    records = archive.store.results(damaged)
+    # A pilot's trials, or those of `watch`, may be many and older: they would hide what the judged ones have become.
+    found = {record.id: record.condition for record in records if record.seed in seeds.get(record.condition, ())}
     for trial in _judged(archive, {trial: versions[condition] for trial, condition in found.items()}):
         for name in names[trial.condition]:
             folder = reproduction.references_of(name.variant)
@@ -99,6 +102,13 @@ def store(reproduction: Reproduction, archive: Archive, reports: Iterable[ClaimR
             reads[_named(path.relative_to(reproduction.references))].update(source.reads)
     known = {name: frozenset(those) for name, those in reads.items()}
     return Side(f"the store {archive.store.root}", transitions.standings(reports), trials, troubles, known, methods)
+
+
+def _seeds(reproduction: Reproduction, names: Iterable[Name]) -> frozenset[int]:
+    """Return the seeds of a condition's trials that a verdict or the drift check may look at."""
+    tiers = [(reproduction.tier(name.tier), name) for name in names]
+    looks = (seed for tier, _ in tiers for seed in tier.design.seeds(tier.design.with_third_look().last.n))
+    return frozenset((*looks, *(seed for tier, name in tiers for seed in tier.seeds_for_drift(name.method, name.task))))
 
 
 def _judged(archive: Archive, trials: Mapping[str, Versions]) -> Iterator[TrialResult]:
