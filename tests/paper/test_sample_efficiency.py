@@ -231,6 +231,21 @@ def test_steps_of_an_imported_curve_count_as_reported_however_uneven_its_reports
     assert judge(measure < 960, Design.fixed(10)).evidence[0].samples[0].median == 950
 
 
+def test_a_number_between_two_reports_of_an_imported_curve_decides_nothing(
+    imported: Callable[[Sequence[int]], TrialGroup],
+) -> None:
+    """Every trial has reached the value somewhere from 100 to 950."""
+    measure = imported([100, 950, 1000]).steps_to("return", 5)
+    for claim in (measure > 500, measure < 500, measure.between(600, 1000), measure.between(100, 500)):
+        verdict = judge(claim, Design.fixed(10))
+        assert (verdict.outcome, verdict.p, verdict.p_refuted) == (Outcome.INCONCLUSIVE, 1.0, 1.0)
+        assert "between two reports" in str(verdict.evidence)
+    for claim in (measure > 100, measure > 99, measure < 951, measure.between(100, 950)):
+        assert judge(claim, Design.fixed(10)).outcome is Outcome.SUPPORTED
+    assert judge(measure.between(10, 99), Design.fixed(10)).outcome is Outcome.REFUTED
+    assert judge(measure.between(960, 999), Design.fixed(10)).outcome is Outcome.REFUTED
+
+
 def test_an_imported_trial_that_ended_early_is_not_advised_to_be_run_otherwise(
     imported: Callable[[Sequence[int]], TrialGroup],
 ) -> None:

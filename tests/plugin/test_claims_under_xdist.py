@@ -35,11 +35,11 @@ FILE = Path("verdicts.toml")
 def test_workers_give_the_verdicts_of_one_process_and_run_each_trial_once(
     project: Any, evoclaims: Evoclaims, sentence: Any
 ) -> None:
-    """What is skipped is known to the controller, and so is a regression."""
+    """What is skipped is known to the controller, and so is a regression, and a claim that is gone."""
     evoclaims("accept", "--tier=smoke", f"--storage={project.store}")
     accepted = history.load(FILE)
     was = replace(accepted["smoke", "a"][0], outcome=Outcome.REFUTED)
-    FILE.write_text(history.dump({("smoke", "a"): (was,)}))
+    FILE.write_text(history.dump({("smoke", "a"): (was,), ("smoke", "z"): (was,)}))
     project.write(**BODIES, f=SKIPPED)
     (project.path / "conftest.py").write_text(SPY)
     fail = "--claims-compare-fail=refuted->supported"
@@ -60,6 +60,7 @@ def test_workers_give_the_verdicts_of_one_process_and_run_each_trial_once(
     sentence(apart, "claims: 2 supported, 1 refuted, 1 inconclusive, 1 error, 1 not run")
     sentence(apart, "- f: its test was skipped (later)")
     sentence(apart, "REGRESSION a (smoke): refuted -> supported")
+    sentence(apart, "z (smoke): gone; it was refuted")
     assert (project.path / "out.xml").read_text().count('name="verdict"') == len(BODIES)
     (project.path / "conftest.py").unlink()
     alone = project.run(own_store=True)

@@ -155,7 +155,10 @@ def test_an_accepted_claim_that_is_gone_is_listed_by_a_run_of_all_claims(accepte
     gone = "b (smoke): gone; it was inconclusive"
     result = accepted.run()
     assert result.ret == 0
-    result.stdout.fnmatch_lines(["against the accepted verdicts: 1 the same, 1 gone", gone])
+    result.stdout.fnmatch_lines(["against the accepted verdicts: 1 the same, 1 gone", gone, "changed: b (smoke), gone"])
+    failing = accepted.run("--claims-compare-fail=*->*")
+    assert failing.ret == 1
+    failing.stdout.fnmatch_lines([f"REGRESSION {gone}", "failed: b (smoke), regression"])
     assert gone in accepted.run("-k", "test_a").outlines
     for others in ("claims/test_claims.py", "claims/test_claims.py::test_a"):  # which other files may have
         shown = accepted.run(others).outlines

@@ -96,10 +96,12 @@ def test_a_test_that_broke_before_its_rules_were_known_has_changed_its_verdict()
     assert matched([transition], parse_patterns("*->error")) == (transition,)
 
 
-def test_new_and_gone_claims_are_no_changes() -> None:
+def test_a_new_claim_is_no_change_and_one_that_is_gone_is_no_longer_run() -> None:
     new, gone = _one(None, Standing(Outcome.REFUTED, "f")), _one(Standing(Outcome.REFUTED, "f"), None)
     assert (describe(new), describe(gone)) == ("G1 (smoke): refuted, new", "G1 (smoke): gone; it was refuted")
-    assert matched([new, gone], EVERY) == ()
+    assert matched([new, gone], EVERY) == (gone,)
+    assert matched([gone], parse_patterns("refuted->not run")) == (gone,)
+    assert matched([gone], parse_patterns("supported->*,*->refuted")) == ()
     assert counts([new, gone, gone]) == "1 new, 2 gone"
 
 

@@ -17,6 +17,7 @@ from evoclaims.judging.sample import (
     Source,
     Trials,
     UnreadableTrialError,
+    beyond,
     checked,
     is_failed,
     ranked,
@@ -151,6 +152,20 @@ class NumberReading(ScalarReading):
 
     def _number(self, trial: TrialResult) -> float:
         return read_number(trial, self.describe(), self.read, _worst(self.better))
+
+    def signs(self, trials: Trials, number: float) -> list[int | None]:
+        """Return of each trial whether its number is above another one (1), at it (0) or below (-1).
+
+        None where that is not known: the trial's reports are at uneven steps, and `number` lies between two of them.
+        """
+
+        def sign(trial: TrialResult) -> int | None:
+            above, before = beyond(self.of(trial), number), self.before if self.window.as_reported else None
+            if before and above > 0 and not is_failed(trial) and beyond(before(checked(trial)), number) < 0:
+                return None
+            return int(above > 0) - int(above < 0)
+
+        return [sign(trial) for trial in trials[self.source.fingerprint]]
 
     def is_shown(self, trials: Trials) -> bool:
         """Whether each trial's number is known as finely as the window has it."""

@@ -31,7 +31,7 @@ from evoclaims.plugin.outcomes import pytest_runtest_makereport as pytest_runtes
 from evoclaims.plugin.outcomes import pytest_runtest_setup as pytest_runtest_setup
 from evoclaims.plugin.progress import QUIET, ProgressLine, progress_of
 from evoclaims.plugin.start import prepare
-from evoclaims.plugin.summary import COLLECTED, KNOWN, TROUBLE, Summary
+from evoclaims.plugin.summary import COLLECTED, COLLECTED_THERE, KNOWN, TROUBLE, Summary
 from evoclaims.trials.stopping import end_without, interrupted_by, only_told
 
 if TYPE_CHECKING:
@@ -208,7 +208,8 @@ def pytest_collection_modifyitems(session: pytest.Session, config: pytest.Config
             tests = claim_tests(items)
         config.stash[KNOWN] = {test.claim.id for test in tests.values()}
         if _collects_all(session):
-            config.stash[COLLECTED] = {test.key for test in tests.values()}
+            config.stash[COLLECTED] = found = {test.key for test in tests.values()}
+            getattr(config, "workeroutput", {})[COLLECTED_THERE] = sorted(found)
         wanted = options.wanted_claims(config, tests.values(), incomplete=session.testsfailed > 0)
     except UserError as error:
         _refuse(config, items, error)

@@ -30,6 +30,9 @@ TROUBLE: Final = "claims_trouble"
 """Name under which an xdist worker sends its controller the reason why it runs nothing."""
 
 
+COLLECTED_THERE: Final = "claims_collected"
+"""Name under which an xdist worker sends its controller the next."""
+
 COLLECTED: Final[pytest.StashKey[set[tuple[str, str]]]] = pytest.StashKey()
 """Tier and name of all claims of the project; only in a run that has collected all of them."""
 
@@ -62,8 +65,11 @@ class Summary:
 
     @pytest.hookimpl(optionalhook=True)
     def pytest_testnodedown(self, node: Any, error: object) -> None:
-        """Note why an xdist worker ran nothing; they all give the same reason."""
-        trouble = getattr(node, "workeroutput", {}).get(TROUBLE)
+        """Note which claims an xdist worker has collected, and why it ran nothing; they all say the same."""
+        output = getattr(node, "workeroutput", {})
+        if COLLECTED_THERE in output:
+            self._config.stash[COLLECTED] = {(tier, name) for tier, name in output[COLLECTED_THERE]}
+        trouble = output.get(TROUBLE)
         if trouble is not None:
             self.report_trouble(trouble)
 
@@ -207,7 +213,7 @@ class Summary:
 
         changed, regressed = None, []
         if self._regression and self._regression.transitions:
-            changed = [f"{name} ({tier})" for tier, name in self._regression.changed]
+            changed = self._regression.names
             regressed = [f"{one.claim} ({one.tier})" for one in self._regression.matched]
         drifted = [row.label for row in self._drift[0].rows if row.drifted] if self._drift else []
         drifted += self._upgrade.drifted if self._upgrade else []

@@ -45,6 +45,12 @@ class Regression:
         keys = [(one.tier, one.claim) for one in self.transitions if one.kind is Kind.CHANGED]
         return {key: self.accepted[key] for key in keys}
 
+    @property
+    def names(self) -> list[str]:
+        """What is changed or gone, such as "G1 (smoke)"."""
+        gone = [f"{one.claim} ({one.tier}), gone" for one in self.transitions if one.kind is Kind.GONE]
+        return [*(f"{claim} ({tier})" for tier, claim in self.changed), *gone]
+
     def lines(self, reasons: Mapping[tuple[str, str], str]) -> list[str]:
         """Return the counts, and a line for each verdict that differs from the accepted one; empty without any.
 

@@ -59,16 +59,17 @@ class Transition:
 
 @dataclass(frozen=True)
 class Pattern:
-    """A change of verdict to look for; None stands for every outcome."""
+    """A change of verdict to look for; None stands for every outcome. A claim that is gone counts as not run."""
 
     old: Outcome | None
     new: Outcome | None
 
     def matches(self, transition: Transition) -> bool:
         """Whether a transition is such a change; False if the verdicts cannot be compared."""
-        if transition.kind is not Kind.CHANGED or transition.old is None or transition.new is None:
+        if transition.kind not in (Kind.CHANGED, Kind.GONE) or transition.old is None:
             return False
-        return self.old in (None, transition.old.outcome) and self.new in (None, transition.new.outcome)
+        new = transition.new.outcome if transition.new else Outcome.NOT_RUN
+        return self.old in (None, transition.old.outcome) and self.new in (None, new)
 
 
 def parse_patterns(text: str) -> tuple[Pattern, ...]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from numbers import Real
 from typing import ClassVar
@@ -14,7 +13,7 @@ from evoclaims.judging.design import Design
 from evoclaims.judging.effect import median_interval
 from evoclaims.judging.exact import sign_test
 from evoclaims.judging.reading import NumberReading
-from evoclaims.judging.sample import Sample, Trials, beyond
+from evoclaims.judging.sample import Sample, Trials
 from evoclaims.judging.verdict import Bound, Interval, PValues
 
 
@@ -56,14 +55,14 @@ class Band(Assertion):
 
     def attainable(self, n: int, design: Design) -> PValues:
         """Return the p of all trials inside, and of all trials beyond one end."""
-        return PValues(_p(0, 0, n).supported, _p(n, 0, n).refuted)
+        return PValues(_p((0, 0), (0, 0), n).supported, _p((n, 0), (n, 0), n).refuted)
 
     def bounds(self, trials: Trials, n: int, design: Design) -> tuple[PValues, PValues]:
         """Bound p by new trials that are all inside, all below or all above."""
-        values = self.measure.sample(trials).values
-        below, above = self._outside(values)
-        new = n - len(values)
-        inside, lower, higher = _p(below, above, n), _p(below + new, above, n), _p(below, above + new, n)
+        out, maybe = self._outside(trials)
+        new = n - len(trials[self.measure.source.fingerprint])
+        inside = _p(out, maybe, n)
+        lower, higher = (_p(_plus(out, more), _plus(maybe, more), n) for more in ((new, 0), (0, new)))
         return (
             PValues(inside.supported, min(lower.refuted, higher.refuted)),
             PValues(max(lower.supported, higher.supported), inside.refuted),
@@ -72,27 +71,39 @@ class Band(Assertion):
     def find(self, trials: Trials, design: Design, alpha: float) -> Finding:
         """Run the sign tests."""
         sample = self.measure.sample(trials)
-        below, above = self._outside(sample.values)
-        n = len(sample.values)
-        p, attainable = _p(below, above, n), self.attainable(n, design)
+        out, maybe = self._outside(trials)
+        n, (below, above) = len(sample.values), out
+        hidden = f"; {sum(maybe) - sum(out)} times an end lies between two reports" if maybe != out else ""
+        p, attainable = _p(out, maybe, n), self.attainable(n, design)
         return self.found(
             p,
             attainable,
             alpha,
             (sample,),
-            detail=f"{below} below, {n - below - above} inside, {above} above",
+            detail=f"{below} below, {n - below - above} inside, {above} above{hidden}",
             bounds=(Bound("lowest", float(self.lo)), Bound("highest", float(self.hi))),
             intervals=lambda: (span_of_median(sample),),
         )
 
-    def _outside(self, values: Sequence[float]) -> tuple[int, int]:
-        return sum(beyond(value, self.lo) < 0 for value in values), sum(beyond(value, self.hi) > 0 for value in values)
+    def _outside(self, trials: Trials) -> tuple[Ends, Ends]:
+        """Return how many trials are below and above, and how many may be, as far as their reports show."""
+        low, high = self.measure.signs(trials, self.lo), self.measure.signs(trials, self.hi)
+        out = low.count(-1), high.count(1)
+        return out, _plus(out, (low.count(None), high.count(None)))
 
 
-def _p(below: int, above: int, n: int) -> PValues:
+Ends = tuple[int, int]
+"""Trials below a range, and above it."""
+
+
+def _plus(one: Ends, other: Ends) -> Ends:
+    return one[0] + other[0], one[1] + other[1]
+
+
+def _p(out: Ends, maybe: Ends, n: int) -> PValues:
     """Return the sign tests' p for a median inside (both must reject) and outside (either may, so doubled)."""
-    inside = max(sign_test(n - below, n).p, sign_test(n - above, n).p)
-    outside = min(sign_test(below, n).p, sign_test(above, n).p)
+    inside = max(sign_test(n - count, n).p for count in maybe)
+    outside = min(sign_test(count, n).p for count in out)
     return PValues(inside, min(1.0, 2 * outside))
 
 

@@ -12,7 +12,7 @@ from evoclaims.judging.design import Design
 from evoclaims.judging.exact import sign_test
 from evoclaims.judging.kinds.band import span_of_median
 from evoclaims.judging.reading import NumberReading
-from evoclaims.judging.sample import Sample, Trials, beyond
+from evoclaims.judging.sample import Trials
 from evoclaims.judging.verdict import Bound, PValues
 
 Side = Literal["above", "below"]
@@ -24,8 +24,9 @@ _OPPOSITE: dict[Side, Side] = {"above": "below", "below": "above"}
 class Threshold(Assertion):
     """The median is above a number, or below it.
 
-    A trial at the number counts for neither direction, so that ties decide nothing. A trial without a result has the
-    worst value, which may count against the claim and never counts for it.
+    A trial at the number counts for neither direction, so that ties decide nothing; nor does one of which its reports
+    do not show on which side it is. A trial without a result has the worst value, which may count against the claim
+    and never counts for it.
     """
 
     measure: NumberReading
@@ -57,18 +58,18 @@ class Threshold(Assertion):
 
     def bounds(self, trials: Trials, n: int, design: Design) -> tuple[PValues, PValues]:
         """Bound p by new trials that are all on one side."""
-        sample = self.measure.sample(trials)
-        toward, away = self._counts(sample)
-        new = n - len(sample.values)
+        toward, away, looked_at = self._counts(trials)
+        new = n - looked_at
         return sign_tests(toward + new, away + new, n), sign_tests(toward, away, n)
 
     def find(self, trials: Trials, design: Design, alpha: float) -> Finding:
         """Run both sign tests."""
         sample = self.measure.sample(trials)
-        toward, away = self._counts(sample)
-        n = len(sample.values)
+        toward, away, n = self._counts(trials)
         decided = toward + away
         undecided = f", {n - decided} at it or without a result, which count for neither" if n > decided else ""
+        if hidden := self.measure.signs(trials, self.number).count(None):
+            undecided += f" (of {hidden} it lies between two reports)"
         return self.found(
             sign_tests(toward, away, n),
             sign_tests(decided, decided, n),
@@ -79,14 +80,14 @@ class Threshold(Assertion):
             intervals=lambda: (span_of_median(sample),),
         )
 
-    def _counts(self, sample: Sample) -> tuple[int, int]:
-        """Return how many trials count for the claim, and how many against it."""
-        sign = 1 if self.side == "above" else -1
-        distances = [sign * beyond(value, self.number) for value in sample.values]
+    def _counts(self, trials: Trials) -> tuple[int, int, int]:
+        """Return how many trials count for the claim, how many against it, and how many there are."""
+        sample, wanted = self.measure.sample(trials), 1 if self.side == "above" else -1
+        signs = self.measure.signs(trials, self.number)
         toward = sum(
-            distance > 0 and seed not in sample.failed for seed, distance in zip(sample.seeds, distances, strict=True)
+            sign == wanted and seed not in sample.failed for seed, sign in zip(sample.seeds, signs, strict=True)
         )
-        return toward, sum(distance < 0 for distance in distances)
+        return toward, signs.count(-wanted), len(signs)
 
 
 def sign_tests(toward: int, away: int, n: int) -> PValues:
