@@ -12,13 +12,14 @@ import socket
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tiny_project import PYPROJECT, Evoclaims
+from tiny_project import PYPROJECT, Evoclaims, trials_of
 
 from evoclaims.cli import jobs, submit
 from evoclaims.cli.submit import dealt
@@ -140,6 +141,32 @@ def test_only_what_is_missing_is_submitted(evoclaims: Evoclaims, slurm: StandIn)
     assert "Nothing to submit: no batch of the smoke tier is missing." in evoclaims("submit", "right")[1]
     assert not slurm.script.exists()
     assert "2 batches of the smoke tier in 2 jobs" in evoclaims("submit", "--on=parity")[1]  # neither right nor wrong
+
+
+@pytest.mark.usefixtures("stored")
+def test_trials_out_of_time_are_done_and_said(evoclaims: Evoclaims, slurm: StandIn) -> None:
+    store = Store(Path(".evoclaims"))
+    late = [replace(trial, status="timeout", champion="") for trial in trials_of(store, "hand_built")]
+    for path in store.record_paths():
+        path.unlink()
+    assert evoclaims("submit", "right", "--on=parity")[0] == 0
+    for trial in late:
+        store.put(replace(trial, timing={**trial.timing, "limit": 1e9}), {})
+    said = ": 10 of 10 trials ran out of time (evoclaims run --retry goes on with them)"
+    assert evoclaims("jobs")[1].splitlines()[0].endswith(said)
+
+
+def test_a_job_whose_condition_was_edited_is_not_done(evoclaims: Evoclaims, slurm: StandIn) -> None:
+    assert evoclaims("submit", "right", "--on=parity")[0] == 0
+    slurm.queue.write_text("41|RUNNING|None|node7\n")
+    (submission,) = Path(".evoclaims/jobs").glob("*.json")
+    (batch,) = load_all(Path(".evoclaims"))[submission.stem].jobs[0].batches
+    submission.write_text(submission.read_text().replace(batch.condition, "e" * 64))
+    assert evoclaims("jobs")[1].startswith("running  41  right on parity, smoke: on node7")
+    slurm.queue.write_text("")
+    status, out, _ = evoclaims("jobs")
+    assert (status, out.splitlines()[-1]) == (0, "1 ended")
+    assert "the paper has no such condition any more: it was edited or taken out" in out
 
 
 @pytest.mark.usefixtures("stored")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -48,7 +48,8 @@ def main(options: argparse.Namespace) -> int:
     for place, state, reason, log in rows:
         more = f": {reason}" * bool(reason) + f" ({log})" * log.exists()
         print(f"{state:8} {place.job.id}  {place.batch.label}, {place.submission.tier_and_variant}{more}")
-    counts = {name: sum(state == name for _, state, *_ in rows) for name in ("queued", "running", "done", "failed")}
+    known = ("queued", "running", "ended", "done", "failed")
+    counts = {name: sum(state == name for _, state, *_ in rows) for name in known}
     print(", ".join(f"{count} {state}" for state, count in counts.items() if count))
     if counts["failed"]:
         print(
@@ -68,34 +69,54 @@ def active(project: Project) -> dict[str, str]:
 
 def _rows(project: Project) -> Iterator[tuple[Place, str, str, Path]]:
     """Yield of each batch its place, its state, such as "queued" or "failed", why, if that is known, and its output."""
-    latest: dict[str, Place] = {}
+    latest: dict[tuple[str, str, str], Place] = {}  # two tiers may share a condition, and look at other seeds of it
     for name, submission in load_all(project.store.root).items():
         for job in submission.jobs:
-            latest |= {batch.condition: Place(name, submission, job, batch) for batch in job.batches}
-    owed = {condition for condition, place in latest.items() if _lacks(project, place)}
+            for batch in job.batches:
+                key = submission.tier, submission.variant, batch.condition
+                latest[key] = Place(name, submission, job, batch)
+    owed = {key for key, place in latest.items() if _lacks(project, place) is not False}
     seen: dict[tuple[str, str], Seen] = {}
     for name, submission in {place.name: place.submission for place in latest.values()}.items():
-        asked = {place.job.id for condition, place in latest.items() if place.name == name and condition in owed}
+        asked = {place.job.id for key, place in latest.items() if place.name == name and key in owed}
         if asked:
             seen |= {(name, job): one for job, one in states(submission, asked).items()}
-    for condition, place in latest.items():
+    for key, place in latest.items():
         log, found = log_of(project.store.root, place.name, place.job), seen.get((place.name, place.job.id), GONE)
-        if condition not in owed or (found.state is State.ENDED and not _lacks(project, place)):  # it ended meanwhile
-            yield place, "done", "", log
+        lacks = _lacks(project, place) if key in owed else False
+        if lacks is False and (key not in owed or found.state is State.ENDED):  # it may have ended meanwhile
+            yield place, "done", _timeouts(project, place), log
+        elif lacks is None and found.state is State.ENDED:
+            yield place, "ended", "the paper has no such condition any more: it was edited or taken out", log
         else:
             yield place, *_state_and_reason(project, place, found, log), log
 
 
-def _lacks(project: Project, place: Place) -> bool:
-    """Whether trials of a batch are missing; of one that the paper no longer has nothing is."""
+def _asked(project: Project, place: Place) -> tuple[StoredTrials, Sequence[int]] | None:
+    """Return the stored trials of a batch, and the seeds that it is to have; None if the paper no longer has it."""
     try:
         tier = project.reproduction.tier(place.submission.tier, place.submission.variant)
         condition = tier.condition(place.batch.method, place.batch.task)
     except UserError:
-        return False
+        return None
+    if condition.id != place.batch.condition:
+        return None
     stored = StoredTrials(project.store, condition, time_limit=project.config.seconds(None))
-    seeds = tier.design.seeds(tier.design.last.n)
-    return condition.id == place.batch.condition and bool(stored.missing(seeds))
+    return stored, tier.design.seeds(tier.design.last.n)
+
+
+def _lacks(project: Project, place: Place) -> bool | None:
+    """Whether trials of a batch are missing; None if the paper no longer has it, so that nobody knows."""
+    asked = _asked(project, place)
+    return bool(asked[0].missing(asked[1])) if asked else None
+
+
+def _timeouts(project: Project, place: Place) -> str:
+    """Say how many trials of a batch ran out of time, which decide nothing."""
+    asked = _asked(project, place)
+    ends = [trial.status for trial in asked[0].sound(asked[1])] if asked else []
+    late = ends.count("timeout")
+    return f"{late} of {len(ends)} trials ran out of time (evoclaims run --retry goes on with them)" if late else ""
 
 
 def _state_and_reason(project: Project, place: Place, seen: Seen, log: Path) -> tuple[str, str]:
