@@ -87,6 +87,36 @@ def test_filters_know_true_however_it_is_written(table: Callable[..., Imported],
 
 
 @pytest.mark.parametrize(
+    ("cells", "wanted", "said"),
+    [
+        (
+            ["a", "a ", "a ", "b"],
+            "a",
+            r"holds 'a ' in row 2 of the column 'algo', which is 'a' but for blanks, and .*2",
+        ),
+        (["a ", "b"], "a", "holds 'a ' in row 1"),
+        (["a", "a "], "a ", "holds 'a' in row 1 of the column 'algo', which is 'a ' but for blanks"),
+        (["true", "True\u00a0"], True, "which is True but for blanks"),
+        (["0.1", "0.10000000149"], 0.1, r"holds '0\.10000000149' in row 2 .*, which is 0\.1 in 32 bits alone"),
+        (["0.10000000149", "0.2"], 0.1, r"no row whose algo is 0\.1\. In 32 bits it is equal to 0\.10000000149: write"),
+        (["0.10000000149", *(f"{k}.5" for k in range(50))], 0.1, r"In 32 bits it is equal to 0\.10000000149: write"),
+    ],
+)
+def test_no_row_is_left_out_whose_value_is_only_written_otherwise(
+    table: Callable[..., Imported], cells: list[str], wanted: object, said: str
+) -> None:
+    text = "seed,return,algo\n" + "".join(f"{seed},{seed},{cell}\n" for seed, cell in enumerate(cells))
+    with pytest.raises(UserError, match=said):
+        _ = table(text, where={"algo": wanted}).existing
+
+
+def test_numbers_that_differ_in_32_bits_and_whole_ones_are_told_apart(table: Callable[..., Imported]) -> None:
+    text = "seed,return,run\n1,5,16777216\n2,6,16777217\n3,7,0.1\n4,8, 0.1\n5,9,0.1000001\n6,9,1e300\n7,9,nan\n"
+    assert _values(table(text, where={"run": 16777217.0})) == [6]
+    assert _values(table(text, where={"run": 0.1})) == [7, 8]
+
+
+@pytest.mark.parametrize(
     "seeds", [[9007199254740992, 9007199254740993], [2**64 - 2, 2**64 - 1], [-(10**38), 310441253894826263190129434872]]
 )
 @pytest.mark.parametrize("form", ["csv", "json"])

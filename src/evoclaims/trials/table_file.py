@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import functools
 import hashlib
-from collections.abc import Iterable, Mapping, Sequence
+import struct
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -57,21 +58,55 @@ class TableFile:
         """Return the rows, counted from 0, that have these values in these columns.
 
         Raises:
-            UserError: when a column or a value in it is unknown, or no row has all.
+            UserError: when a column or a value in it is unknown, when cells hold a value but for how it is written, or
+                no row has all.
         """
         rows: Sequence[int] = range(self.columns.rows)
         for name, value in where.items():
             held = self._rows_by_cell(name)
-            found = {row for cell, at in held.values() if _is(cell, value) for row in at}
+            found: set[int] = set()
+            others: list[tuple[Any, list[int]]] = []
+            for cell, at in held.values():
+                if _is(cell, value):
+                    found.update(at)
+                else:
+                    others.append((cell, at))
+            self._require_none_left_out(name, value, others, "but for blanks", _is_but_for_blanks)
             if not found:
                 self._require_text(text for _, text in held)
+                rounded = [str(cell) for cell, _ in others if _is_in_32_bits(cell, value)][:MOST_LISTED]
                 known = guess(value, {text for _, text in held}) if len(held) <= MOST_LISTED else ""
+                if rounded:  # closer than any that looks alike
+                    known = f" In 32 bits it is equal to {', '.join(rounded)}: write one of these."
                 raise UserError(f"{self.name} has no row whose {name} is {value!r}.{known}")
+            self._require_none_left_out(name, value, others, "in 32 bits alone", _is_in_32_bits)
             rows = sorted(found.intersection(rows))
         if not rows:
             conditions = " and ".join(f"{name} {value!r}" for name, value in where.items())
             raise UserError(f"{self.name} has no row with {conditions}." if where else f"{self.name} has no row.")
         return list(rows)
+
+    def _require_none_left_out(
+        self,
+        name: str,
+        value: object,
+        others: Iterable[tuple[Any, list[int]]],
+        how: str,
+        alike: Callable[[Any, object], bool],
+    ) -> None:
+        """Check that no cell of the `others` is `alike` a wanted value: a verdict on the other rows alone may differ.
+
+        Raises:
+            UserError: when one is.
+        """
+        near = [(cell, at) for cell, at in others if alike(cell, value)]
+        if near:
+            cell, at = near[0]
+            raise UserError(
+                f"{self.name} holds {cell!r} in row {at[0] + 1} of the column {name!r}, which is {value!r} {how}, and "
+                f"where= keeps rows that have the value itself: rows like this one, {sum(len(at) for _, at in near)} "
+                "in all, would be left out unseen. Write the value in one way in the whole column."
+            )
 
     def _rows_by_cell(self, name: str) -> Mapping[tuple[type, str], tuple[Any, list[int]]]:
         """Return each different cell of a column with its rows: found once, as many conditions share a table."""
@@ -149,6 +184,21 @@ def _is(cell: Any, value: object) -> bool:
     try:
         return isinstance(value, int | float) and exact(cell) == value
     except (TypeError, ValueError):
+        return False
+
+
+def _is_but_for_blanks(cell: Any, value: object) -> bool:
+    """Whether a text holds a value once the blanks around both are gone."""
+    return isinstance(cell, str) and _is(cell.strip(), value.strip() if isinstance(value, str) else value)
+
+
+def _is_in_32_bits(cell: Any, value: object) -> bool:
+    """Whether a cell holds a fraction as 32 bits have it: 0.10000000149 is 0.1; whole numbers are counts, and exact."""
+    if not isinstance(value, float) or not 2**-126 <= abs(value) < 2**24 or value.is_integer():
+        return False
+    try:
+        return struct.pack("f", exact(cell)) == struct.pack("f", value)
+    except (TypeError, ValueError, OverflowError):  # no number, or none of 32 bits
         return False
 
 
