@@ -316,3 +316,5 @@ def test_commands_read_the_table_where_no_trial_is_stored_and_say_that_there_is_
     report = unpacked.read(ours.path / "report" / "index.html")
     assert "imported from runs.csv, sha256 " in report
     assert "by Ada" in report
+    assert '<th scope="row">0 (10 in the table)</th>' in report
+    assert ">seed 0 (10 in the table): 0.8<" in report

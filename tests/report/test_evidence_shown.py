@@ -7,14 +7,16 @@ from typing import Any
 
 import pytest
 from hand_made_verdicts import evidence, verdict
-from laboratory import Laboratory
+from laboratory import HERE, Laboratory
 from unpacked import whole
 
 from evoclaims.judging.assertion import Assertion
 from evoclaims.judging.exact import MAX_TRIALS
-from evoclaims.judging.sample import Sample
+from evoclaims.judging.sample import Sample, sample
 from evoclaims.judging.verdict import Bound
-from evoclaims.report.evidence import Part, judged_parts
+from evoclaims.report.charts import strip_svg
+from evoclaims.report.evidence import Part, judged_parts, unjudged_part
+from evoclaims.report.trial_summary import Reader
 from evoclaims.verdicts.claim_report import ClaimReport
 
 
@@ -82,12 +84,40 @@ def test_of_a_refuted_part_the_p_against_it_comes_first(filled: Laboratory) -> N
 def test_values_are_written_out_by_seed() -> None:
     def part(n: int) -> Part:
         values = (*[0.5] * (n - 1), -math.inf)
-        sample = Sample("a: x", tuple(range(n)), values, 0.5, (n - 1,), ("timeout",))
-        (shown,) = judged_parts(verdict(evidence=(evidence(samples=(sample,)),), deciding=0))
+        one = Sample("a: x", tuple(range(n)), values, 0.5, (n - 1,), ("timeout",))
+        (shown,) = judged_parts(verdict(evidence=(evidence(samples=(one,)),), deciding=0))
         return shown
 
-    assert part(3).rows == ((0, ("0.5",)), (1, ("0.5",)), (2, ("timeout",)))
+    assert part(3).rows == (("0", ("0.5",)), ("1", ("0.5",)), ("2", ("timeout",)))
     assert len(part(MAX_TRIALS).rows) == MAX_TRIALS
+
+
+def test_trials_of_a_table_are_named_by_its_seeds(lab: Laboratory) -> None:
+    """One table has the seeds 1 and 2, another 2 and 3: a row of the report is a row of either, or of both."""
+    samples = tuple(
+        Sample(f"{name}: x", (0, 1), (0.5, -math.inf), 0.5, (1,), ("diverged",), known_as=known_as)
+        for name, known_as in {
+            "a": ("0 (1 in the table)", "1 (2 in the table)"),
+            "b": ("0 (1 in the table)", "1 (<i>3</i>\n in the table)"),
+            "c": (),
+        }.items()
+    )
+    (part,) = judged_parts(verdict(evidence=(evidence(samples=samples),), deciding=0))
+    assert part.rows == (
+        ("0", ("–", "–", "0.5")),
+        ("0 (1 in the table)", ("0.5", "0.5", "–")),
+        ("1", ("–", "–", "diverged")),
+        ("1 (2 in the table)", ("diverged", "–", "–")),
+        ("1 (<i>3</i> in the table)", ("–", "diverged", "–")),
+    )
+    drawn = [strip_svg(part, strip) for strip in part.strips]
+    assert [">seed 0 (1 in the table): 0.5<" in one for one in drawn] == [True, True, False]
+    assert ">seed 1 (&lt;i&gt;3&lt;/i&gt; in the table): diverged<" in drawn[1]
+    (trial,) = lab.put("better", [0.25], provenance={**HERE, "seed_in_table": "<7>"})
+    assert sample("a", [trial], [0.25]).known_as == ("0 (<7> in the table)",)
+    alone = unjudged_part("a", Reader(lab.archive).read([trial.id]))
+    assert alone.rows == (("0 (<7> in the table)", ("0.25",)),)
+    assert ">seed 0 (&lt;7&gt; in the table): 0.25<" in strip_svg(alone, alone.strips[0])
 
 
 def test_of_several_parts_the_one_that_decided_is_marked(filled: Laboratory) -> None:

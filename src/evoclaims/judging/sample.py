@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Final, Protocol
 
 from evoclaims.core.errors import guess
@@ -68,6 +68,7 @@ class Sample:
         failed: seeds of the diverged or timed-out trials.
         endings: how each of these ended, such as "diverged".
         limit: an infinite value of a trial that has not failed is only known to be larger than this; None without one.
+        known_as: `TrialResult.seed_in_words` of each trial; empty if these are the seeds themselves.
     """
 
     label: str
@@ -77,6 +78,7 @@ class Sample:
     failed: tuple[int, ...]
     endings: tuple[str, ...] = ()
     limit: float | None = None
+    known_as: tuple[str, ...] = field(default=(), metadata={"canonical": "if set"})
 
     @property
     def capped(self) -> tuple[float, ...]:
@@ -177,13 +179,15 @@ def ranked(value: float, trial: TrialResult, what: str) -> float:
 def sample(label: str, trials: Sequence[TrialResult], values: Sequence[float]) -> Sample:
     """Return the sample of `values`, one for each of `trials`, without a limit."""
     failed = [trial for trial in trials if is_failed(trial)]
+    seeds, known_as = tuple(trial.seed for trial in trials), tuple(trial.seed_in_words for trial in trials)
     return Sample(
         label=label,
-        seeds=tuple(trial.seed for trial in trials),
+        seeds=seeds,
         values=tuple(float(value) for value in values),
         median=median(values) if values else math.nan,
         failed=tuple(trial.seed for trial in failed),
         endings=tuple(trial.status for trial in failed),
+        known_as=() if known_as == tuple(map(str, seeds)) else known_as,
     )
 
 

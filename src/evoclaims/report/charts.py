@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from markupsafe import Markup, escape
 
-from evoclaims.report.evidence import Dot, Part, Strip
+from evoclaims.report.evidence import Part, Strip
 from evoclaims.report.formatting import large, number, plural
 from evoclaims.report.training_curves import CurvePanel, Line
 
@@ -62,10 +62,10 @@ def strip_svg(part: Part, strip: Strip) -> Markup:
         pieces.append(_mark("share", diamond, f"holds in {share:.0%} of trials"))
     elif strip.median is not None and math.isfinite(strip.median):
         pieces.append(_mark("median", f"M{_at(scale(strip.median))} 4V{HEIGHT - 4}", f"median {number(strip.median)}"))
-    pieces.append(Markup('<g class="dots">{}</g>').format(Markup("").join(_dots(strip.dots, scale))))
+    pieces.append(Markup('<g class="dots">{}</g>').format(Markup("").join(_dots(strip, scale))))
     if _right(part) < WIDTH - EDGE:
         pieces.append(Markup('<path class="wall" d="M{0} 1V{1}"/>').format(WIDTH - APART + 3, HEIGHT))
-        pieces += _apart(strip.apart)
+        pieces += _apart(strip)
     name = f"{strip.label}, {plural(strip.n, 'trial')}, median {strip.middle}"
     return _svg(WIDTH, HEIGHT, pieces, name)
 
@@ -133,9 +133,9 @@ def _right(part: Part) -> float:
     return WIDTH - EDGE - (APART if any(strip.apart for strip in part.strips) else 0.0)
 
 
-def _dots(dots: Sequence[Dot], scale: _Scale) -> Iterator[Markup]:
+def _dots(strip: Strip, scale: _Scale) -> Iterator[Markup]:
     """Draw a dot per trial; values too close for two dots side by side share a block around their mean."""
-    ordered = sorted(dots, key=lambda dot: (dot.value, dot.seed))
+    ordered = sorted(strip.dots, key=lambda dot: (dot.value, dot.seed))
     places = [scale(dot.value) for dot in ordered]
     start = 0
     while start < len(ordered):
@@ -150,8 +150,8 @@ def _dots(dots: Sequence[Dot], scale: _Scale) -> Iterator[Markup]:
             column, row = divmod(index, rows)
             deep = min(rows, end - start - column * rows)
             x, y = left + (column + 0.5) * room, (HEIGHT - 8) / 2 + (row - (deep - 1) / 2) * room
-            says = f"seed {dot.seed:d}: {number(dot.value)}"
-            # Only numbers are filled in, so that nothing needs escaping.
+            says = escape(f"seed {strip.seed_in_words(dot.seed)}: {number(dot.value)}")
+            # Nothing else needs escaping: the rest that is filled in is numbers.
             yield Markup(f'<circle cx="{_at(x)}" cy="{_at(y)}" r="{radius}"><title>{says}</title></circle>')  # noqa: S704
         start = end
 
@@ -170,14 +170,14 @@ def _block(total: float, count: int) -> tuple[float, float, float, int]:
     return centre - width / 2, centre + width / 2 + room / 2, room, rows
 
 
-def _apart(trials: Sequence[tuple[int, str]]) -> Iterator[Markup]:
+def _apart(strip: Strip) -> Iterator[Markup]:
     """Draw trials without a finite value as crosses in a column of their own; no side has more than `MAX_TRIALS`."""
-    room = min(9.0, math.sqrt((HEIGHT - 10) * (APART - 12) / max(len(trials), 1)))
+    room = min(9.0, math.sqrt((HEIGHT - 10) * (APART - 12) / max(len(strip.apart), 1)))
     across = max(int((APART - 12) / room), 1)
-    for index, (seed, why) in enumerate(trials):
+    for index, (seed, why) in enumerate(strip.apart):
         row, column = divmod(index, across)
         x, y, r = _at(WIDTH - APART + 9 + column * room), _at(5 + row * room), _at(0.6 * room)
-        yield _mark("broken", f"M{x} {y}l{r} {r}m0 -{r}l-{r} {r}", f"seed {seed}: {why}")
+        yield _mark("broken", f"M{x} {y}l{r} {r}m0 -{r}l-{r} {r}", f"seed {strip.seed_in_words(seed)}: {why}")
 
 
 def _ends(series: Sequence[np.ndarray[tuple[int, ...], np.dtype[np.float64]]]) -> tuple[float, float]:

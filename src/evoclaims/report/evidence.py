@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from statistics import median
 
 from evoclaims.judging.effect import iqm, iqm_interval
@@ -32,6 +32,7 @@ class Strip:
         apart: trials without one, as (seed, why): "diverged", "NaN".
         median: of all values that the judge used; None if there are none.
         least: what the median is at least, where values beyond a limit are not observed and it is one of them.
+        known_as: the seeds in words, by seed; those that are the number alone may be left out.
     """
 
     label: str
@@ -39,6 +40,16 @@ class Strip:
     apart: tuple[tuple[int, str], ...]
     median: float | None
     least: float | None = None
+    known_as: Mapping[int, str] = field(default_factory=dict)
+
+    def seed_in_words(self, seed: int) -> str:
+        """Return the seed of a trial as its reader finds it, such as "0 (1 in the table)"."""
+        return self.known_as.get(seed, str(seed))
+
+    @property
+    def texts(self) -> tuple[tuple[int, str], ...]:
+        """Every trial's seed, and its value as text."""
+        return (*((dot.seed, number(dot.value)) for dot in self.dots), *self.apart)
 
     @property
     def n(self) -> int:
@@ -78,13 +89,11 @@ class Part:
     decided: bool = False
 
     @property
-    def rows(self) -> tuple[tuple[int, tuple[str, ...]], ...]:
-        """Every trial's value as text, one row per seed and one column per strip."""
-        columns = [
-            {**{dot.seed: number(dot.value) for dot in strip.dots}, **dict(strip.apart)} for strip in self.strips
-        ]
+    def rows(self) -> tuple[tuple[str, tuple[str, ...]], ...]:
+        """Every trial's value as text, one column per strip, and one row per seed with what each table calls it."""
+        columns = [{(seed, strip.seed_in_words(seed)): text for seed, text in strip.texts} for strip in self.strips]
         seeds = sorted({seed for column in columns for seed in column})
-        return tuple((seed, tuple(column.get(seed, "–") for column in columns)) for seed in seeds)
+        return tuple((seed[1], tuple(column.get(seed, "–") for column in columns)) for seed in seeds)
 
 
 def judged_parts(verdict: Verdict) -> tuple[Part, ...]:
@@ -117,7 +126,8 @@ def unjudged_part(label: str, trials: Sequence[TrialSummary]) -> Part:
     shown = {dot.seed for dot in dots}
     apart = tuple((t.seed, _why(t)) for t in trials if t.seed not in shown)
     middle = median(dot.value for dot in dots) if dots else None
-    strip = Strip(clean(f"{label}: mean success over levels"), dots, apart, middle)
+    known_as = {t.seed: clean(t.seed_in_words) for t in trials}
+    strip = Strip(clean(f"{label}: mean success over levels"), dots, apart, middle, known_as=known_as)
     return Part("the trials at hand, not judged", None, (), "", False, (strip,))
 
 
@@ -136,7 +146,8 @@ def _strip(sample: Sample) -> Strip:
     shown = {dot.seed for dot in dots}
     beyond = "" if sample.limit is None else f"> {number(sample.limit)}"
     apart = tuple((seed, failed.get(seed, beyond or number(value))) for seed, value in pairs if seed not in shown)
-    return Strip(clean(sample.label), dots, apart, sample.median, _least(sample, median))
+    known_as = dict(zip(sample.seeds, map(clean, sample.known_as), strict=bool(sample.known_as)))
+    return Strip(clean(sample.label), dots, apart, sample.median, _least(sample, median), known_as)
 
 
 def _least(sample: Sample, statistic: Callable[[Sequence[float]], float]) -> float | None:
