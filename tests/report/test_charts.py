@@ -19,6 +19,7 @@ from evoclaims.judging.exact import MAX_TRIALS
 from evoclaims.judging.verdict import Bound, Interval
 from evoclaims.report.charts import HEIGHT, WIDTH, axis_svg, curves_svg, strip_svg, ticks
 from evoclaims.report.evidence import Dot, Part, Strip
+from evoclaims.report.formatting import large
 from evoclaims.report.training_curves import CurvePanel, Line
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
@@ -114,14 +115,37 @@ def _corners(values: list[float]) -> list[np.ndarray[Any, Any]]:
     """Return the corners of each stretch of a curve that is drawn, from steps relative to the corner before."""
     line = Line("seed <0>", np.arange(float(len(values))), np.array(values))
     svg = ElementTree.fromstring(curves_svg(CurvePanel("success", (line,), 1), "success over training"))
-    paths = [path for path in svg.iter("path") if path.get("class") == "line"]
+    paths = [path for path in svg.iter("path") if path.get("class") in ("line", "point")]
     assert all(path.findtext("title") == "seed <0>" for path in paths)
     stretches = [one for path in paths for one in path.get("d", "").split("M")[1:]]
-    return [np.array(one.replace("l", " ").split(), float).reshape(-1, 2).cumsum(axis=0) for one in stretches]
+    return [
+        np.array(one.replace("l", " ").removesuffix("h0").split(), float).reshape(-1, 2).cumsum(axis=0)
+        for one in stretches
+    ]
 
 
 def test_a_curve_has_a_gap_where_it_has_no_value_and_two_points_for_a_flat_stretch() -> None:
     assert [len(one) for one in _corners([0, 1, math.nan, 1, 1, 1, 0])] == [2, 3]
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "lines", "points"),
+    [
+        ([0, 1, 2], [5.0, math.nan, 6.0], [], ["M34 112h0M232 8h0"]),
+        ([0, 1, 2, 3], [5.0, 6.0, math.nan, 5.0], ["M34 112l66 -104"], ["M232 112h0"]),
+        ([7], [5.0], [], ["M232 60h0"]),
+        ([0, 1000, 1000.001], [math.nan, 5.0, 5.0], [], ["M232 60h0"]),  # both at one place
+        ([], [], [], []),
+    ],
+)
+def test_a_point_that_no_line_reaches_is_a_dot(
+    x: list[float], y: list[float], lines: list[str], points: list[str]
+) -> None:
+    panel = CurvePanel("success", (Line("seed 0", np.array(x), np.array(y)),), 1)
+    svg = ElementTree.fromstring(curves_svg(panel, "success over training"))
+    drawn = [[path.get("d") for path in svg.iter("path") if path.get("class") == kind] for kind in ("line", "point")]
+    assert drawn == [lines, points]
+    assert [text.text for text in svg.iter("text")][-1] == large(max(x, default=1.0))  # where the axis ends
 
 
 @given(st.lists(st.one_of(st.just(math.nan), st.integers(-40, 40).map(float)), min_size=2, max_size=60))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -90,16 +91,18 @@ def axis_svg(part: Part) -> Markup:
 def curves_svg(panel: CurvePanel, name: str) -> Markup:
     """Draw a panel of training curves; `name` says what it shows."""
     width, height = PANEL
-    xs = _ends([line.x for line in panel.lines])
+    end = _shown(max((float(line.x.max()) for line in panel.lines if len(line.x)), default=1.0))
     ys = _ends([line.y for line in panel.lines])
-    x = _Scale(0.0, xs[1] or 1.0, LEFT, width - RIGHT)
+    x = _Scale(0.0, end or 1.0, LEFT, width - RIGHT)
     y = _Scale(*ys, height - BOTTOM, TOP)
     pieces = [Markup('<path class="rule" d="M{0} {1}V{2}H{3}"/>').format(LEFT, TOP, height - BOTTOM, width - RIGHT)]
     for value in ticks(*ys, most=3):
         pieces.append(_text("small", LEFT - 4, y(value) + 3, large(value), "end"))
-    for value, anchor in ((0.0, "start"), (xs[1], "end")):
+    for value, anchor in ((0.0, "start"), (end, "end")):
         pieces.append(_text("small", x(value), height - 8, large(value), anchor))
-    pieces += [_mark("line", path, line.label) for line in panel.lines if (path := _path(line, x, y))]
+    for line in panel.lines:
+        paths = zip(("line", "point"), _paths(line, x, y), strict=True)
+        pieces += [_mark(kind, path, line.label) for kind, path in paths if path]
     return _svg(width, height, pieces, name)
 
 
@@ -189,12 +192,14 @@ def _ends(series: Sequence[np.ndarray[tuple[int, ...], np.dtype[np.float64]]]) -
     return (low, high) if high > low else (low - 0.5, high + 0.5)
 
 
-def _path(line: Line, x: _Scale, y: _Scale) -> str:
-    """Return a curve as path data, with a gap where a value is not finite; flat stretches take two points.
+def _paths(line: Line, x: _Scale, y: _Scale) -> tuple[str, str]:
+    """Return a curve as path data, with a gap where a value is not finite, and its points that no line reaches.
 
-    Each point is given from the one before, in halves of a unit: curves are most of the page, and these steps repeat.
+    Flat stretches take two points. Each point is given from the one before, in halves of a unit: curves are most of the
+    page, and these steps repeat.
     """
-    path, pen, last = [], "M", (0, 0)
+    path: list[str] = []
+    pen, last = "M", (0, 0)
     # Rounded before the difference, so that no error adds up.
     heights = [round(2 * y(up)) if math.isfinite(up) else None for up in line.y]
     for index, (across, height) in enumerate(zip(line.x, heights, strict=True)):
@@ -202,13 +207,15 @@ def _path(line: Line, x: _Scale, y: _Scale) -> str:
             pen = "M"
             continue
         flat = 0 < index < len(heights) - 1 and heights[index - 1] == height == heights[index + 1]
-        if flat and pen != "M":
-            continue
         place = (round(2 * x(across)), height)
+        if pen != "M" and (flat or place == last):
+            continue
         before = (0, 0) if pen == "M" else last
         path.append(f"{pen}{(place[0] - before[0]) / 2:g} {(place[1] - before[1]) / 2:g}")
         pen, last = "l" if pen == "M" else " ", place
-    return "".join(path)
+    alone = [step[0] == after[0] == "M" for step, after in pairwise([*path, "M"])]
+    joined = "".join(step for step, lone in zip(path, alone, strict=True) if not lone)
+    return joined, "".join(f"{step}h0" for step, lone in zip(path, alone, strict=True) if lone)
 
 
 def _mark(kind: str, path: str, title: str) -> Markup:

@@ -10,11 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evoclaims.report.formatting import clean, number, plural
-from evoclaims.report.trial_summary import POINTS, TrialSummary
+from evoclaims.report.trial_summary import AXES, POINTS, TrialSummary
 from evoclaims.verdicts.watch_file import Night, standing
-
-AXES: Final = ("environment_steps", "steps")
-"""Curves that count the spent budget; the first is the panels' axis."""
 
 FIRST: Final = ("success", "fitness", "level")
 """Curves that every method has; they come first."""
@@ -53,7 +50,7 @@ class CurvePanel:
 
 def panels(trials: Sequence[TrialSummary]) -> tuple[tuple[CurvePanel, ...], str]:
     """Return the panels of a condition's trials, and in words what is not drawn."""
-    usable = [trial for trial in trials if trial.reports > 1 and np.isfinite(trial.curves.get(AXES[0], np.nan)).all()]
+    usable = [trial for trial in trials if trial.reports > 1 and trial.curves]
     if not usable:
         return (), "No trial has a curve of more than one point." if trials else ""
     names = set.intersection(*(set(trial.curves) for trial in usable)) - set(AXES)
@@ -65,23 +62,24 @@ def panels(trials: Sequence[TrialSummary]) -> tuple[tuple[CurvePanel, ...], str]
         notes.append(f"{len(trials) - len(usable)} of {len(trials)} trials have at most one point")
     if varying[MOST_PANELS:]:
         notes.append(f"not drawn: {', '.join(map(clean, varying[MOST_PANELS:]))}")
-    longest = max(trial.reports for trial in usable)
+    drawn = varying[:MOST_PANELS]
+    longest = max((trial.curves[name].reported for trial in usable for name in drawn), default=0)
     if longest > POINTS:
         notes.append(f"at most {POINTS} of {longest} reports are drawn")
     text = "; ".join(notes)
-    return tuple(_panel(usable, name) for name in varying[:MOST_PANELS]), text[:1].upper() + text[1:] + "." * bool(text)
+    return tuple(_panel(usable, name) for name in drawn), text[:1].upper() + text[1:] + "." * bool(text)
 
 
 def _constant(trials: Sequence[TrialSummary], name: str) -> float | None:
     """Return the value that a quantity has in all trials at all times; None when it changes."""
-    first = trials[0].curves[name][0]
-    same = all(np.array_equal(t.curves[name], np.full_like(t.curves[name], first), equal_nan=True) for t in trials)
-    return float(first) if same else None
+    values = [value for trial in trials if (value := trial.curves[name].constant) is not None]
+    same = len(values) == len(trials) and np.array_equal(values, values[:1] * len(values), equal_nan=True)
+    return values[0] if same else None
 
 
 def _panel(trials: Sequence[TrialSummary], name: str) -> CurvePanel:
-    broken = sum(not np.isfinite(trial.curves[name]).all() for trial in trials)
-    lines = tuple(Line(f"seed {t.seed_in_words}", t.curves[AXES[0]], t.curves[name]) for t in trials)
+    broken = sum(not np.isfinite(trial.curves[name].y).all() for trial in trials)
+    lines = tuple(Line(f"seed {t.seed_in_words}", t.curves[name].x, t.curves[name].y) for t in trials)
     return CurvePanel(clean(name), lines, broken)
 
 

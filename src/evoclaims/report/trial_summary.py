@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,7 +15,7 @@ from evoclaims.core.errors import UserError
 from evoclaims.core.packages import DEPENDS_ON, Versions
 from evoclaims.paper.archive import Archive
 from evoclaims.report.formatting import clean, counted, listed, plural
-from evoclaims.trials.result import TrialResult
+from evoclaims.trials.result import TRAINED_BY, TrialResult
 
 SHORT: Final = 9
 """Digits of a revision that are shown."""
@@ -97,8 +98,39 @@ def _text(value: Any) -> str:
     return clean(value)
 
 
+AXES: Final = ("environment_steps", "steps")
+"""Curves that count the spent budget; the first is what others are drawn over."""
+
 POINTS: Final = 100
 """Most points of a training curve that are kept."""
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """One quantity of a trial over its training.
+
+    Attributes:
+        x, y: at most `POINTS` evenly spread points of those that are finite, the first and the last among them, and one
+            that is not for each stretch between, before or after them that was not finite: a gap.
+        reported: how many numbers it has, finite or not.
+        constant: the value of all of them; None if they differ, or there are none.
+    """
+
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    reported: int
+    constant: float | None
+
+    @staticmethod
+    def of(x: NDArray[np.float64], y: NDArray[np.float64]) -> Curve:
+        """Thin what was reported."""
+        finite, broken = np.flatnonzero(np.isfinite(y)), np.flatnonzero(~np.isfinite(y))
+        if len(finite) > POINTS:
+            finite = finite[np.linspace(0, len(finite) - 1, POINTS).round().astype(int)]
+        _, gaps = np.unique(np.searchsorted(finite, broken), return_index=True)
+        kept = np.union1d(finite, broken[gaps])
+        same = len(y) > 0 and np.array_equal(y, np.full_like(y, y[0]), equal_nan=True)
+        return Curve(x[kept], y[kept], len(y), float(y[0]) if same else None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +143,7 @@ class TrialSummary:
         score: the "mean_success" metric; None without it.
         origin: where it was made.
         reports: how many points its curves have.
-        curves: by name, at most `POINTS` evenly spread points of each, the first and the last among them.
+        curves: by name; none where the steps are unknown that they are drawn over.
     """
 
     trial: str
@@ -121,7 +153,7 @@ class TrialSummary:
     score: float | None
     origin: Origin
     reports: int
-    curves: Mapping[str, NDArray[np.float64]]
+    curves: Mapping[str, Curve]
 
 
 class Reader:
@@ -160,8 +192,6 @@ class Reader:
     def _summary(self, found: TrialResult) -> TrialSummary:
         self.settings.setdefault(found.condition, {k: v for k, v in found.spec.items() if k != "seed"})
         origin = Origin.of(found.provenance)
-        reports = max(map(len, found.curves.values()), default=0)
-        kept = slice(None) if reports <= POINTS else np.linspace(0, reports - 1, POINTS).round().astype(int)
         return TrialSummary(
             trial=found.id,
             seed=found.seed,
@@ -169,6 +199,26 @@ class Reader:
             status=found.status,
             score=found.metrics.get("mean_success"),
             origin=self._origins.setdefault(origin, origin),
-            reports=reports,
-            curves={name: np.asarray(curve, np.float64)[kept] for name, curve in found.curves.items()},
+            reports=max(map(len, found.curves.values()), default=0),
+            curves=_curves(found),
         )
+
+
+def _curves(trial: TrialResult) -> dict[str, Curve]:
+    """Return the curves of a trial, each of the numbers that were reported.
+
+    Where a table has an empty cell, or a training loop's report lacks a number, nothing was logged: a record has NaN
+    there, and the curve goes on. Where NaN was or may have been reported there is a gap: of a method, which reports all
+    numbers each time, of a loop that has diverged, and at the end of a table's metric that is NaN.
+    """
+    every = {name: np.asarray(curve, np.float64) for name, curve in trial.curves.items()}
+    x = every.get(AXES[0])
+    if x is None or not np.isfinite(x).all():
+        return {}
+    leaves_out = "imported" in trial.spec or (TRAINED_BY in trial.provenance and trial.status == "done")
+    found = {}
+    for name, y in every.items():
+        known = ~np.isnan(y) if leaves_out else np.ones(len(y), bool)
+        known[-1:] |= math.isnan(trial.metrics.get(name, 0.0))
+        found[name] = Curve.of(x[known], y[known])
+    return found
