@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import replace
 from importlib.metadata import PathDistribution, version
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from evoclaims.cli.elsewhere import Elsewhere, NotJudgedError
 from evoclaims.core.environments import Environment, Recipe, installed_here
 from evoclaims.trials.store import Store
 from evoclaims.verdicts.across import Judged
+from evoclaims.verdicts.source_trials import SourceTrials
 
 RELEASES = [f"1.{minor}" for minor in range(1, 8)]
 BISECT = ("bisect", "a", "--package", "pebble", "--good", "1.0", "--bad", "1.8", "--releases", *RELEASES)
@@ -220,6 +222,33 @@ def test_no_claim_is_left_out_nor_judged_by_trials_of_other_versions_whatever_th
     assert [one.outcome for one in found] == ["refuted", "supported"]
     with pytest.raises(NotJudgedError, match=f"from trials of numpy {here['numpy']}, which is not what is installed"):
         elsewhere._run(Environment(project.path, {**here, "numpy": "1.0"}), stored)
+
+
+def test_an_environment_with_trials_of_code_that_was_edited_since_is_not_judged(
+    evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """A release that was judged before the edit would differ from one that is judged after it."""
+    source = SourceTrials("ours", "parity", "c" * 64, (), {"pebble": ("1.0",)}, ())
+    kept = {"1.0": replace(source, edited=("paper.Pebbles",)), "1.1": replace(source, versions={"pebble": ("1.1",)})}
+
+    def judges(elsewhere: Elsewhere, environment: Environment, *_: object) -> list[str]:
+        told = json.dumps({"claims": [report("a", sources=(kept[environment.versions["pebble"]],)).to_json()]})
+        return [sys.executable, "-c", f"import pathlib, sys; pathlib.Path(sys.argv[1]).write_text({told!r})"]
+
+    monkeypatch.setattr(Elsewhere, "_command", lambda *asked: [*judges(*asked), str(asked[-1])])
+    monkeypatch.setattr(
+        "evoclaims.cli.elsewhere.make", lambda recipe, *_: Environment(tmp_path, {"pebble": recipe.version})
+    )
+    status, out, _ = evoclaims("across", "--package", "pebble", "1.0", "1.1")
+    assert status == 1
+    assert (
+        "pebble 1.0: its claims were judged from trials that ran before paper.Pebbles was edited or renamed; raise "
+        "its `revision`, so that they run again, or name another --storage\n" in out
+    )
+    assert out.endswith("pebble 1.0 has no verdicts.\n")
+    status, _, err = evoclaims("bisect", "a", "--package=pebble", "--good=1.0", "--bad=1.1", "--releases=1.0")
+    assert status == 2
+    assert "pebble 1.0, named by --good, cannot be judged: its claims were judged from trials that ran before" in err
 
 
 def test_an_environment_with_what_is_too_old_is_not_judged_and_its_packages_are_named(

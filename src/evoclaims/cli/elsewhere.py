@@ -41,6 +41,7 @@ from evoclaims.report.table_cells import totals
 from evoclaims.trials.store import Store
 from evoclaims.verdicts.across import Judged, judged
 from evoclaims.verdicts.claim_report import ClaimReport
+from evoclaims.verdicts.other_code import edited, listed
 from evoclaims.verdicts.source_trials import in_words, versions_of
 
 KEPT = "environments"
@@ -124,6 +125,12 @@ class Elsewhere:
             raise NotJudgedError(
                 f"its claims were judged from trials of {others}, which is not what is installed there; "
                 "leave --claims-any-version and --claims-stored out of PYTEST_ADDOPTS"
+            )
+        # Only some releases may have such trials: the edit would look like a change of the others, or hide one.
+        if names := sorted({name for report in reports for name in edited(report)}):
+            raise NotJudgedError(
+                f"its claims were judged from trials that ran before {printable(listed(names))} was edited or renamed; "
+                "raise its `revision`, so that they run again, or name another --storage"
             )
         return reports
 
