@@ -15,6 +15,7 @@ from tiny_project import Evoclaims, Project
 
 from evoclaims.cli.elsewhere import Elsewhere, NotJudgedError
 from evoclaims.core.environments import Environment, Recipe, installed_here
+from evoclaims.judging.verdict import Outcome
 from evoclaims.trials.store import Store
 from evoclaims.verdicts.across import Judged
 from evoclaims.verdicts.source_trials import SourceTrials
@@ -36,7 +37,7 @@ def outcomes(monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
         outcome = known[recipe.version]
         if outcome == "gone":
             return Judged(recipe.label, {"other": report("other")}, {})
-        if outcome not in ("supported", "refuted", "inconclusive", "error"):
+        if outcome not in list(Outcome):
             return Judged(recipe.label, {}, {}, trouble=outcome)
         return Judged(recipe.label, {"a": report("a", outcome)}, {})
 
@@ -107,7 +108,6 @@ def test_the_table_is_printed_and_written_and_the_status_says_that_something_cha
     status, out, _ = evoclaims("across", "--package", "pebble", "1.0", "1.1", "1.0", "--as", "markdown")
     assert (status, outcomes["asked"]) == (0, "1.0 1.1 ")
     assert "No verdict changed and no drift was shown in 1 environment after the first." in out
-    assert "No trial of these claims depends on pebble" in out
     assert Path("report/across.md").read_text().startswith("# No verdict changed")
     status, out, _ = evoclaims("across", "--package", "pebble", "1.0", "1.2", "--as", "csv", "--out", "t.csv")
     assert status == 1
@@ -121,6 +121,39 @@ def test_the_table_is_printed_and_written_and_the_status_says_that_something_cha
     assert not Path(".evoclaims").exists()
     assert evoclaims("report")[0] == 0
     assert "pebble 1.3 has no verdicts." in unpacked.read(Path("report/index.html"))
+
+
+@pytest.mark.parametrize(
+    ("outcome", "headline"),
+    [
+        ("error", "No claim was judged: pebble 1.0 has errors in a; pebble 1.1 has errors in a.\n"),
+        ("not run", "No claim was judged.\n"),
+    ],
+)
+def test_claims_that_nothing_judges_are_not_called_unchanged(
+    evoclaims: Evoclaims, outcomes: dict[str, str], outcome: str, headline: str
+) -> None:
+    outcomes |= {"1.0": outcome, "1.1": outcome}
+    status, out, _ = evoclaims("across", "--package", "pebble", "1.0", "1.1")
+    assert status == 1
+    assert out.endswith(headline)
+    assert "depends on" not in out
+
+
+@pytest.mark.parametrize(
+    ("packages", "outcome", "told"),
+    [(("my_pebble",), "supported", 0), (("jax",), "supported", 1), (("jax",), "error", 0), ((), "supported", 0)],
+)
+def test_that_no_trial_depends_on_a_package_is_said_where_trials_show_it(
+    evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch, packages: tuple[str, ...], outcome: str, told: int
+) -> None:
+    """By any spelling of its name; and not of claims without trials, or that broke before they had all."""
+    versions = dict.fromkeys(packages, ("1.0",))
+    sources = (SourceTrials("ours", "parity", "c" * 64, (), versions, ()),) if versions else ()
+    judged = {"a": report("a", sources=sources), "b": report("b", outcome)}
+    monkeypatch.setattr(Elsewhere, "judge", lambda self, recipe: Judged(recipe.label, judged, {}))
+    _, out, _ = evoclaims("across", "--package", "my.Pebble", "1.0", "1.1")
+    assert out.count("No trial of these claims depends on my.Pebble") == told
 
 
 def test_nothing_is_judged_where_the_newest_release_is_installed(

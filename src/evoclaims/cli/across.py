@@ -11,8 +11,6 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
 
-from packaging.utils import canonicalize_name
-
 from evoclaims.cli.elsewhere import opened, released
 from evoclaims.cli.terminal import REPORT, styled, write
 from evoclaims.core.environments import Recipe, checked, checked_name, installed_here
@@ -31,7 +29,7 @@ FORMS: Final[Mapping[str, Callable[[Across], bytes]]] = {
 
 
 def main(options: argparse.Namespace) -> int:
-    """Judge in every environment and print the table; 1 when something changed, or one has no verdicts."""
+    """Judge in every environment and print the table; 1 when something changed, broke or was not judged."""
     if options.form is not None and options.form not in FORMS:
         raise UnknownNameError("form", options.form, FORMS)
     recipes = _recipes(options)
@@ -54,7 +52,7 @@ def main(options: argparse.Namespace) -> int:
         out = Path(options.out or REPORT / f"across.{'md' if options.form == 'markdown' else options.form}")
         write(out, FORMS[options.form](found), ours=options.out is None)
         print(f"wrote {out}")
-    return int(bool(found.changed or found.without_verdicts))
+    return int(bool(found.changed or found.without_verdicts or found.broken or not found.judged))
 
 
 def _command() -> str:
@@ -104,7 +102,12 @@ def _version(package: str, word: str) -> str:
 
 
 def _unused(found: Across, package: Sequence[str] | None) -> list[str]:
-    """Return a line when no trial depends on the package, so that its releases could change no trial."""
-    if not package or any(one.depends_on(canonicalize_name(package[0])) for one in found.environments):
+    """Return a line when no trial depends on the package, so that its releases could change no trial.
+
+    Of claims without trials, or with errors, nobody knows on what these would depend.
+    """
+    reports = (report for one in found.environments for report in one.reports.values())
+    known = not found.broken and any(report.sources for report in reports)
+    if not package or not known or any(one.depends_on(package[0]) for one in found.environments):
         return []
     return [f"No trial of these claims depends on {package[0]}: its releases can only change how they are judged."]

@@ -66,9 +66,12 @@ def markdown(found: Across, command: str) -> str:
 
 
 def headline(found: Across) -> str:
-    """Return in a sentence what changed against the first environment, and which have no verdicts."""
+    """Return in a sentence what changed against the first environment, and what was not judged."""
     parts = [f"{label} changes {', '.join(claims)}" for label, claims in found.changed.items()]
     parts += [f"{label} has no verdicts" for label in found.without_verdicts]
+    parts += [f"{label} has errors in {', '.join(claims)}" for label, claims in found.broken.items()]
+    if not found.judged:
+        return f"No claim was judged{': ' * bool(parts)}{'; '.join(parts)}."
     if parts:
         return f"{'; '.join(parts)}."
     compared = len(found.environments) - 1

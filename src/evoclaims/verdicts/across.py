@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from packaging.utils import canonicalize_name
+
 from evoclaims.judging.drift_report import DriftReport, DriftRow
 from evoclaims.judging.verdict import Outcome
 from evoclaims.trials.result import TrialResult
@@ -39,7 +41,8 @@ class Judged:
 
     def depends_on(self, package: str) -> bool:
         """Whether a judged trial depends on a package, whose other releases would else change nothing."""
-        return any(package in source.versions for report in self.reports.values() for source in report.sources)
+        named = (name for report in self.reports.values() for source in report.sources for name in source.versions)
+        return canonicalize_name(package) in map(canonicalize_name, named)
 
 
 @dataclass(frozen=True)
@@ -108,6 +111,20 @@ class Across:
     def without_verdicts(self) -> list[str]:
         """Labels of the environments that could not be made, or in which no claim could be judged."""
         return [one.label for one in self.environments if one.trouble]
+
+    @property
+    def broken(self) -> dict[str, list[str]]:
+        """Claims that are errors, by label of the environment: nothing is known of them there."""
+        found: dict[str, list[str]] = {}
+        for (claim, label), cell in self.cells.items():
+            if cell.outcome is Outcome.ERROR:
+                found.setdefault(label, []).append(claim)
+        return found
+
+    @property
+    def judged(self) -> bool:
+        """Whether a claim was judged anywhere."""
+        return any(cell.outcome.judged for cell in self.cells.values())
 
     @property
     def lines(self) -> list[str]:
