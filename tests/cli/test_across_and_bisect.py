@@ -11,11 +11,15 @@ from pathlib import Path
 import pytest
 import unpacked
 from hand_made_verdicts import report
+from made_trials import trial_of
 from tiny_project import Evoclaims, Project
 
 from evoclaims.cli.elsewhere import Elsewhere, NotJudgedError
 from evoclaims.core.environments import Environment, Recipe, installed_here
+from evoclaims.envs.gates.parity import NParity
 from evoclaims.judging.verdict import Outcome
+from evoclaims.methods.hand_built import HandBuilt
+from evoclaims.trials.spec import Budget, Condition
 from evoclaims.trials.store import Store
 from evoclaims.verdicts.across import Judged
 from evoclaims.verdicts.source_trials import SourceTrials
@@ -67,7 +71,7 @@ def test_a_release_that_cannot_be_judged_is_gone_round_and_told(
     outcomes["1.4"] = instead
     status, out, _ = evoclaims(*BISECT)
     assert status == 0
-    assert "changed after pebble 1.3 and not later than 1.5; unknown, since not judged:\n  pebble 1.4: " in out
+    assert "changed after pebble 1.3 and not later than 1.5; unknown between them:\n  pebble 1.4: " in out
     assert ("it cannot be installed" in out) == (instead != "error")
 
 
@@ -78,9 +82,36 @@ def test_a_claim_that_is_gone_has_changed_and_a_release_without_it_alone_says_no
     assert "changed in pebble 1.3; 1.2 was still as 1.0." in evoclaims(*BISECT)[1]
     _from(outcomes, "1.3", "refuted")
     outcomes["1.2"] = "gone"
-    assert (
-        "not later than 1.3; unknown, since not judged:\n  pebble 1.2: the claim is broken or" in evoclaims(*BISECT)[1]
-    )
+    assert "not later than 1.3; unknown between them:\n  pebble 1.2: the claim is broken or" in evoclaims(*BISECT)[1]
+
+
+@pytest.mark.parametrize(("kind", "odd"), [("bits", {"machine": "other"}), ("drift", {"few": True})])
+def test_a_release_whose_trials_cannot_be_compared_has_not_stayed_the_same(
+    evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch, kind: str, odd: dict[str, object]
+) -> None:
+    """All but 1.4's can be: it has the change of 1.3, which it does not show."""
+    condition = Condition(HandBuilt(), NParity(2), "direct", Budget(generations=1, reports=1))
+    here = {"device": {"platform": "cpu", "kind": "cpu"}, "machine": "Linux"}
+
+    def judge(self: Elsewhere, recipe: Recipe) -> Judged:
+        unlike = odd if recipe.version == "1.4" else {}
+        made = {**here, **unlike, "versions": {"pebble": recipe.version}}
+        change = (kind == "drift") / 2 if recipe.version >= "1.3" else 0.0
+        # Of a change of the bits alone the drift check sees nothing: half of the trials are higher, half are lower.
+        values = [0.5 + seed / 1000 - change + (-1) ** seed * (recipe.version >= "1.3") / 5000 for seed in range(10)]
+        trials = [trial_of(condition, seed, value, provenance=made) for seed, value in enumerate(values)]
+        trials = trials[:2] if "few" in unlike else trials
+        source = SourceTrials("ours", "parity", condition.id, (), {"pebble": (recipe.version,)}, ())
+        return Judged(recipe.label, {"a": report("a", sources=(source,))}, {source.label: tuple(trials)})
+
+    monkeypatch.setattr(Elsewhere, "judge", judge)
+    status, out, _ = evoclaims(*BISECT)
+    assert status == 0
+    assert f"The {kind} of a changed from pebble 1.0 to 1.8" in out
+    assert f"The {kind} of a changed in pebble 1.3; 1.2 " in out
+    status, out, _ = evoclaims(*BISECT[: -len(RELEASES)], "1.2", "1.4", "1.5")
+    assert f"The {kind} of a changed after pebble 1.2 and not later than 1.5; unknown between them:\n" in out
+    assert f"  pebble 1.4: not all of its trials can be compared with those of pebble 1.0 for {kind}\n" in out
 
 
 def test_where_nothing_changed_the_status_says_so(evoclaims: Evoclaims, outcomes: dict[str, str]) -> None:

@@ -55,7 +55,7 @@ def test_the_release_of_a_changed_verdict_is_found_by_few_environments_round_one
 ) -> None:
     ran = evoclaims("bisect", "P1[pebbles]", "--package", "pebble", "--good", RELEASES[0], "--bad", RELEASES[-1])
     assert ran.returncode == 0, ran.stdout + ran.stderr
-    assert f"changed after pebble {LARGER} and not later than {NEGATED}; unknown, since not judged:" in ran.stdout
+    assert f"changed after pebble {LARGER} and not later than {NEGATED}; unknown between them:" in ran.stdout
     assert f"pebble {UNINSTALLABLE}: No matching distribution found for gravel-that-nobody-has" in ran.stdout
     assert "P1[pebbles]: supported -> refuted" in ran.stdout
     assert _made(folder).keys() == {RELEASES[0], LARGER, NEGATED, RELEASES[-1]}

@@ -137,6 +137,21 @@ def test_trials_that_the_first_environment_lacks_are_not_called_the_same(store: 
     assert across_report.cell_lines(cell) == ("✓ supported, CHANGED", "–")
 
 
+def test_what_cannot_be_compared_is_told_apart_from_what_is_the_same(store: Store) -> None:
+    """Trials of another machine or of none have bits, and too few of them drift, that nobody knows."""
+    first, four = _environment(store, "1"), _environment(store, "4")
+    ((name, trials),) = four.trials.items()
+    elsewhere = tuple(replace(one, provenance={**one.provenance, "machine": "other"}) for one in trials)
+    few, others = {name: elsewhere[:2]}, {name: (*trials[:8], *elsewhere[8:])}
+    cells = [across([first, replace(four, trials=those)]).cells["ours", "jax 4"] for those in (few, others, {})]
+    apart = [{str(trial.seed) for trial in trials[:2]}, {str(trial.seed) for trial in trials[8:]}, {""}]
+    assert [{seed for _, seed in cell.without_bits} for cell in cells] == apart
+    assert [bool(cell.untested) for cell in cells] == [True, False, True]
+    for same in (_environment(store, "2"), replace(first, label="again")):
+        cell = across([first, same]).cells["ours", same.label]
+        assert (cell.without_bits, cell.untested) == (frozenset(), frozenset())
+
+
 def test_what_did_not_change_is_said_as_far_as_it_was_compared(store: Store) -> None:
     one, two = (replace(_environment(store, version), label=version) for version in "12")
     only = [replace(each, reports={"ours": each.reports["ours"]}) for each in (one, two, replace(one, label="again"))]

@@ -59,6 +59,13 @@ KINDS: Final[Mapping[str, Callable[[Cell], bool]]] = {
 }
 """What can have changed against the first release, the weightiest first."""
 
+UNCOMPARED: Final[Mapping[str, Callable[[Cell], Collection[tuple[str, str]]]]] = {
+    "verdict": lambda cell: (),
+    "drift": lambda cell: cell.untested,
+    "bits": lambda cell: cell.without_bits,
+}
+"""What of a claim could not be compared with the first release, so that it may have changed unseen."""
+
 
 def main(options: argparse.Namespace) -> int:
     """Find the release and print it; 1 when nothing changed between the two that are named."""
@@ -79,7 +86,8 @@ def main(options: argparse.Namespace) -> int:
                 f"{tried[index].label}, named by {option}, cannot be judged: {tried[index].trouble}. If "
                 "the release itself is the cause, name another one."
             )
-    kinds = [kind for kind in KINDS if options.by in (None, kind) and _differs(tried[0], tried[last], kind)]
+    at_the_end = _cells(tried[0], tried[last])
+    kinds = [kind for kind in KINDS if options.by in (None, kind) and any(map(KINDS[kind], at_the_end))]
     if not kinds:
         found = _unchanged(tried[0], tried[last], [kind for kind in KINDS if options.by in (None, kind)])
         print(f"{options.claim} with {package} {bad} as with {good}: {found}.")
@@ -90,23 +98,39 @@ def main(options: argparse.Namespace) -> int:
         flush=True,
     )
     claims = tried[0].reports.keys() | tried[last].reports.keys()
-    at_the_ends = _broken(tried[0], claims) | _broken(tried[last], claims)
+    broken_at_the_ends = _broken(tried[0], claims) | _broken(tried[last], claims)
+    never_compared = _uncompared(at_the_end, kind)
+    why = dict[int, str]()
 
     def has_changed(index: int) -> bool | None:
         now = judge(index)
-        return None if now.trouble or _broken(now, claims) - at_the_ends else _differs(tried[0], now, kind)
+        if now.trouble or _broken(now, claims) - broken_at_the_ends:
+            why[index] = now.trouble or "the claim is broken or not run there"
+            return None
+        cells = _cells(tried[0], now)
+        if any(map(KINDS[kind], cells)):
+            return True
+        if _uncompared(cells, kind) - never_compared:
+            why[index] = f"not all of its trials can be compared with those of {tried[0].label} for {kind}"
+            return None
+        return False
 
-    _tell(bisect(len(releases), has_changed), releases, tried, package, kind, options.claim)
+    _tell(bisect(len(releases), has_changed), releases, tried, package, kind, options.claim, why)
     return 0
 
 
-def _differs(first: Judged, now: Judged, kind: str) -> bool:
-    return any(KINDS[kind](cell) for (_, label), cell in across([first, now]).cells.items() if label == now.label)
+def _cells(first: Judged, now: Judged) -> list[Cell]:
+    return [cell for (_, label), cell in across([first, now]).cells.items() if label == now.label]
+
+
+def _uncompared(cells: Collection[Cell], kind: str) -> set[tuple[str, str]]:
+    """Return what may have changed unseen, such as the bits of trials of another machine."""
+    return {one for cell in cells for one in UNCOMPARED[kind](cell)}
 
 
 def _unchanged(first: Judged, last: Judged, kinds: Collection[str]) -> str:
     """Return in words what of these kinds is the same at both ends, as far as it could be compared."""
-    cells = [cell for (_, label), cell in across([first, last]).cells.items() if label == last.label]
+    cells = _cells(first, last)
     compared = sum(cell.compared for cell in cells)
     tested = compared or any(cell.drift is not None for cell in cells)  # the same bits need no test
     found = {
@@ -125,16 +149,22 @@ def _broken(judged: Judged, claims: Collection[str]) -> set[tuple[str, Outcome]]
 
 
 def _tell(
-    change: Change, releases: list[str], tried: Mapping[int, Judged], package: str, kind: str, claim: str
+    change: Change,
+    releases: list[str],
+    tried: Mapping[int, Judged],
+    package: str,
+    kind: str,
+    claim: str,
+    why: Mapping[int, str],
 ) -> None:
-    """Print where it changed, what is known about it, and how many environments that took."""
+    """Print where it changed, what is known about it, why it is not for the others, and how many environments ran."""
     before, after, what = releases[change.before], releases[change.after], f"The {kind} of {claim}"
     for line in across([tried[change.before], tried[change.after]]).lines:
         print(f"  {line}")
     if change.unknown:
-        print(f"{what} changed after {package} {before} and not later than {after}; unknown, since not judged:")
+        print(f"{what} changed after {package} {before} and not later than {after}; unknown between them:")
         for index in change.unknown:
-            print(f"  {tried[index].label}: {tried[index].trouble or 'the claim is broken or not run there'}")
+            print(f"  {tried[index].label}: {why[index]}")
     else:
         still = "shows no drift from" if kind == "drift" else "was still as"
         print(f"{what} changed in {package} {after}; {before} {still} {releases[0]}.")

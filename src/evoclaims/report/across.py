@@ -120,7 +120,7 @@ def cell_lines(cell: Cell | None) -> tuple[str, ...]:
         return (verdict,)
     if not cell.repeated:
         return verdict, "the same trials" if cell.n and cell.same else NONE
-    if cell.whole and not cell.changed and not cell.drifted:
+    if not cell.without_bits and not cell.changed and not cell.drifted:
         return verdict, "same to the bit"
     bits = f"{cell.changed} of {cell.compared} differ" if cell.compared else "other machine"
     if cell.drift is None:

@@ -16,6 +16,9 @@ from evoclaims.verdicts.history import ordered
 from evoclaims.verdicts.source_trials import SourceTrials
 from evoclaims.verdicts.upgrade import Succession, Upgrade, upgrade
 
+_Parts = frozenset[tuple[str, str]]
+"""Conditions by label, each with a seed or a measure."""
+
 
 @dataclass(frozen=True)
 class Judged:
@@ -56,9 +59,10 @@ class Cell:
         repeated: whether some of its trials were made anew, since they depend on what differs.
         compared: those of them that can be compared to the bit, by seed.
         changed: how many of these differ.
-        whole: whether all can be compared.
         drift: of what the drift check tested, the metric with the smallest p; None if it tested nothing.
         same: whether its trials are those of the first environment, since they depend on nothing that differs.
+        without_bits: the trials that cannot be compared to the bit, by condition and seed; all of one without a seed.
+        untested: what the drift check could not test, by condition and measure; all of one without a measure.
     """
 
     outcome: Outcome
@@ -67,9 +71,10 @@ class Cell:
     repeated: bool = False
     compared: int = 0
     changed: int = 0
-    whole: bool = False
     drift: DriftRow | None = None
     same: bool = False
+    without_bits: _Parts = frozenset()
+    untested: _Parts = frozenset()
 
     @property
     def drifted(self) -> bool:
@@ -211,7 +216,11 @@ def _cell(name: str, one: Judged, first: Judged | None, found: Upgrade | None) -
     """Return the cell of a claim in an environment; `first` and `found` are None in the first one."""
     report = one.reports.get(name)
     cell = Cell(one.outcome(name), report.n if report else 0, first.outcome(name) if first else None)
-    if first is None or found is None or report is None:
+    if first is None or found is None:
+        return cell
+    without_bits, untested = _uncompared(name, one, first, found)
+    cell = replace(cell, without_bits=without_bits, untested=untested)
+    if report is None:
         return cell
     labels = {source.label for source in report.sources}
     own = [one for one in found.successions if one.label in labels]
@@ -221,7 +230,24 @@ def _cell(name: str, one: Judged, first: Judged | None, found: Upgrade | None) -
         repeated=bool(own),
         compared=sum(len(one.pairs) for one in own),
         changed=sum(one.changed for one in own),
-        whole=all(len(one.pairs) == len(one.now) for one in own),
         drift=min(rows, key=lambda row: (not row.drifted, row.p_holm, row.p or 1.0), default=None),
         same=bool(labels) and all(first.trials.get(label, ()) == one.trials.get(label) for label in labels),
     )
+
+
+def _uncompared(name: str, one: Judged, first: Judged, found: Upgrade) -> tuple[_Parts, _Parts]:
+    """Return what of a claim cannot be compared with the first environment: trials to the bit, measures for drift."""
+    sources = [source for judged in (first, one) if name in judged.reports for source in judged.reports[name].sources]
+    both = {own.label: own for own in found.successions}
+    without_bits, untested = set[tuple[str, str]](), set[tuple[str, str]]()
+    for label in {source.label for source in sources}:
+        if label in both:
+            compared = {new.seed for _, new in both[label].pairs}
+            apart = {(label, str(trial.seed)) for trial in both[label].now if trial.seed not in compared}
+            without_bits |= apart
+            if apart or both[label].changed:  # the same bits need no test
+                untested |= {(label, row.metric) for row in found.drift.unchecked if row.label == label}
+        elif first.trials.get(label, ()) != one.trials.get(label, ()):  # only one of both has such trials
+            without_bits.add((label, ""))
+            untested.add((label, ""))
+    return frozenset(without_bits), frozenset(untested)
