@@ -148,6 +148,21 @@ def test_this_program_is_found_in_a_folder_with_a_space_in_its_name(
     assert environments._this_program() == asked
 
 
+def test_an_environment_of_a_project_with_other_dependencies_is_another_one(
+    make_one: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A layer over what is installed here holds none of the project's, and stays."""
+    monkeypatch.setattr(environments, "_made", lambda recipe, empty, *_: empty)
+    (tmp_path / "pins.txt").write_text("a<3\n")
+    whole, layers = [], []
+    for edit in ('dependencies = ["a==1"]', 'dependencies = ["a==2"]', 'readme = "b"', "dependencies = 5"):
+        (tmp_path / "pyproject.toml").write_text(f'[project]\nname = "ours"\n{edit}\n')
+        whole.append(make_one("", "", constraints=tmp_path / "pins.txt").folder)
+        layers.append(make_one("pebble", "1.0").folder)
+    assert [whole.index(folder) for folder in whole] == [0, 1, 2, 2]
+    assert len(set(layers)) == 1
+
+
 def test_without_uv_no_other_python_is_tried(make_one: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setattr(environments.sysconfig, "get_path", lambda *_: str(tmp_path))

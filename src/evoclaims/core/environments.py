@@ -182,7 +182,8 @@ def make(recipe: Recipe, kept: Path, project: Path, begins: Callable[[], None]) 
     Raises:
         NotInstallableError: when it cannot be made; nothing of it is left.
     """
-    basis = installed_here() if recipe.is_layer else _requirements(project)
+    # What is asked for by a folder's address depends on what is declared there, too; extras are not asked for.
+    basis = installed_here() if recipe.is_layer else [*_requirements(project), *_declared(project)]
     pins = _pins(recipe)
     key = content_hash([recipe.package, recipe.version, recipe.python, sys.prefix, sys.version, basis, pins])[:12]
     folder = (kept / f"{file_name(recipe.label.replace(' ', '_').replace(',', ''))}.{key}").absolute()
@@ -246,7 +247,7 @@ def folder_of(package: str, version: str) -> str:
 def _oldest(project: Path) -> dict[str, Version]:
     """Return the oldest version of each package that evoclaims and the project declare to work, by normalized name."""
     found: dict[str, Version] = {}
-    for text in (*(importlib.metadata.requires(PROGRAM) or ()), *_described(project).get("dependencies", ())):
+    for text in _declared(project):
         try:
             requirement = Requirement(text)
         except InvalidRequirement:
@@ -258,6 +259,12 @@ def _oldest(project: Path) -> dict[str, Version]:
         if lowest:
             found[name] = max(lowest if name not in found else [*lowest, found[name]])
     return found
+
+
+def _declared(project: Path) -> list[str]:
+    """Return the dependencies that evoclaims and the project declare."""
+    own = _described(project).get("dependencies")
+    return [*(importlib.metadata.requires(PROGRAM) or ()), *map(str, own if isinstance(own, list) else ())]
 
 
 def _made(recipe: Recipe, empty: Environment, project: Path, pins: str) -> Environment:
