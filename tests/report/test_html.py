@@ -216,8 +216,8 @@ def test_the_same_page_is_the_same_text(filled: Laboratory) -> None:
 
 
 def test_a_picture_is_an_address_of_its_own_text() -> None:
-    svg = '<svg xmlns="http://www.w3.org/2000/svg"><text>100 % #1 "ä"</text></svg>'.encode()
-    kind, _, text = data_uri(svg).partition(",")
+    svg = '<svg xmlns="http://www.w3.org/2000/svg"><text x="{}">100.1234 % #1 "ä"</text><path d="M 1.{} 2"/></svg>'
+    kind, _, text = data_uri(svg.format("3.456789", "23456").encode()).partition(",")
     assert kind == "data:image/svg+xml"
     assert not set(text) & set('"<>#ä\n')
-    assert unquote_to_bytes(text) == svg
+    assert unquote_to_bytes(text) == svg.format("3.45", "23").encode()

@@ -102,11 +102,14 @@ class TrialNumbers:
 
 
 def read(scope: Scope, method: str, task: str, measure_of: MeasureOf) -> TrialNumbers:
-    """Read a measure from every trial that the scope's tier looks at."""
+    """Read a measure from every trial that verdicts look at: of a condition with a third look, those of that."""
     group = scope.group(method, task)
-    measure = measure_of(group)
-    seeds = scope.tier.design.seeds(len(scope.seeds), bool(group.condition.existing))
-    trials = scope.archive.trials(group.condition, seeds)
+    measure, design = measure_of(group), scope.tier.design
+    for n in (design.with_third_look().last.n, design.last.n):
+        seeds = design.seeds(n, bool(group.condition.existing))
+        trials = scope.archive.trials(group.condition, seeds)
+        if None not in trials:
+            break
     ids = [TrialSpec(group.condition, seed).id for seed in seeds]
     each = [_number(measure, *found) for found in zip(seeds, ids, trials, strict=True)]
     return TrialNumbers(method, task, measure.name, tuple(each))
