@@ -42,6 +42,19 @@ SOUND = {("a", "b"): condition()}
 RIGHT: PolicyFn = HandBuilt().best(PARITY, jnp.int32(0))
 
 
+class Halved(faults.Fault):
+    """A fault of the project's own."""
+
+    says = "is halved"
+
+
+def test_the_code_of_a_projects_own_fault_is_looked_at() -> None:
+    """Else an edited fault would be judged by its old trials without a word."""
+    assert [*condition(plant(Halved, CMA_ES)).code] == [f"{__name__}.Halved"]
+    assert [*condition(task=plant(Halved, PARITY)).code] == [f"{__name__}.Halved"]
+    assert condition(plant(faults.Minimizes, CMA_ES)).code == {}
+
+
 def examined(fault: type[Any], policy: PolicyFn, level: int = 1) -> Episode:
     return plant(fault, PARITY).examine(policy, KEY, jnp.int32(level))  # type: ignore[no-any-return]
 

@@ -76,10 +76,11 @@ def test_findings_count_sentences_whose_cases_end_alike_at_the_papers_tier(fille
     page = filled.page(*reports, *one("C1", good, where="control"), *one("T5", good, tier="smoke"), sentences=said)
     found = findings(page, opening_lines(page))
     assert [(one.says, [line.claim for line in one.lines]) for one in found] == [
-        ("1 of 5 sentences (full): supported in every case", ["T1"]),
-        ("1 of 5 sentences (full): supported but vacuous in every case", ["T7"]),
-        ("1 of 5 sentences (full): refuted in every case", ["T4"]),
-        ("2 of 5 sentences (full): cases end differently", ["T2", "T3"]),
+        ("1 of 6 sentences (full): supported in every case", ["T1"]),
+        ("1 of 6 sentences (full): supported but vacuous in every case", ["T7"]),
+        ("1 of 6 sentences (full): refuted in every case", ["T4"]),
+        ("1 of 6 sentences (full): not run in every case", ["T5"]),
+        ("2 of 6 sentences (full): cases end differently", ["T2", "T3"]),
     ]
     only = filled.page(*one("T5", good, tier="smoke"))
     (finding,) = findings(only, opening_lines(only))

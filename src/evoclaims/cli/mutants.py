@@ -22,6 +22,7 @@ from evoclaims.verdicts import mutation_matrix
 from evoclaims.verdicts.claim_report import Tried
 from evoclaims.verdicts.history import key_of
 from evoclaims.verdicts.mutation_matrix import Fate, Sensitivity, score
+from evoclaims.verdicts.other_code import edits
 
 
 def main(options: argparse.Namespace) -> int:
@@ -68,6 +69,8 @@ def main(options: argparse.Namespace) -> int:
     for (on, claim), row in sorted(matrix.items()):
         if on == options.tier:
             print("\n".join(_told(claim, row)))
+    for line in edits([report for several in reports for report in several]):
+        print(f"evoclaims: {line}", file=sys.stderr)
     print(f"{score(matrix, options.tier)}\nwrote {path}: look at the changes and commit them")
     return int(bool(failed))
 

@@ -101,21 +101,20 @@ def findings(page: Page, lines: Sequence[OpeningLine]) -> list[Finding]:
             for one in sentences(section.report for section in board.sections)
             if not one.same_as
         ]
-        judged = [(line, tallies) for line, tallies in ended if tallies != {Tally.NOT_RUN}]
-        if judged:
-            return list(_findings(board.tier, judged))
+        if any(tallies != {Tally.NOT_RUN} for _, tallies in ended):
+            return list(_findings(board.tier, ended))
     return []
 
 
-def _findings(tier: str, judged: Sequence[tuple[OpeningLine, set[Tally]]]) -> Iterator[Finding]:
+def _findings(tier: str, ended: Sequence[tuple[OpeningLine, set[Tally]]]) -> Iterator[Finding]:
     """Yield the sentences whose cases all have one outcome, by outcome, and then the others."""
-    of = f"of {plural(len(judged), 'sentence')} ({tier})"
+    of = f"of {plural(len(ended), 'sentence')} ({tier})"
     for tally in Tally:
-        if alike := tuple(line for line, outcomes in judged if outcomes == {tally}):
+        if alike := tuple(line for line, outcomes in ended if outcomes == {tally}):
             says = f"{len(alike)} {of}: {tally} in every case"
             kind = Outcome.SUPPORTED.name if tally in APART else tally.name
             yield Finding(tier, kind.lower(), tally.symbol, says, alike)
-    if others := tuple(line for line, outcomes in judged if len(outcomes) > 1):
+    if others := tuple(line for line, outcomes in ended if len(outcomes) > 1):
         yield Finding(tier, "", "", f"{len(others)} {of}: cases end differently", others)
 
 
