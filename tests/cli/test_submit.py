@@ -144,6 +144,17 @@ def test_only_what_is_missing_is_submitted(evoclaims: Evoclaims, slurm: StandIn)
 
 
 @pytest.mark.usefixtures("stored")
+def test_more_trials_than_the_tiers_are_submitted_and_looked_for(evoclaims: Evoclaims, slurm: StandIn) -> None:
+    """Those of a third look, for example."""
+    _, out, _ = evoclaims("submit", "right", "--on=parity", "--trials=12")
+    assert "right on parity: 2 trials" in out
+    (submission,) = load_all(Path(".evoclaims")).values()
+    assert submission.trials == 12
+    assert evoclaims("jobs")[1].splitlines()[-2] == "1 failed"  # two are missing
+    assert "--trials takes 1 to 100 trials" in evoclaims("submit", "right", "--trials=101")[2]
+
+
+@pytest.mark.usefixtures("stored")
 def test_trials_out_of_time_are_done_and_said(evoclaims: Evoclaims, slurm: StandIn) -> None:
     store = Store(Path(".evoclaims"))
     late = [replace(trial, status="timeout", champion="") for trial in trials_of(store, "hand_built")]

@@ -101,6 +101,7 @@ def _running(add: _Add) -> None:
     submit.add_argument("method", nargs="?", help="only this method")
     _option(submit, "--on TASK", "only this task")
     _option(submit, "--variant NAME", "only what this variant of the protocol changes", default="")
+    _option(submit, "--trials N", "trials per condition (default: the tier's; a third look takes 30)", type=int)
     _option(submit, "--cluster CLUSTER", "slurm (default), or local: jobs on this machine", default="slurm")
     _option(submit, "--partition NAME", "SLURM's partition")
     _option(submit, "--gpus N", "GPUs of a job", type=int)

@@ -102,7 +102,7 @@ def _asked(project: Project, place: Place) -> tuple[StoredTrials, Sequence[int]]
     if condition.id != place.batch.condition:
         return None
     stored = StoredTrials(project.store, condition, time_limit=project.config.seconds(None))
-    return stored, tier.design.seeds(tier.design.last.n)
+    return stored, tier.design.seeds(place.submission.trials or tier.design.last.n)
 
 
 def _lacks(project: Project, place: Place) -> bool | None:

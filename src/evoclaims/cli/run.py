@@ -7,12 +7,10 @@ import sys
 from collections.abc import Sequence
 
 from evoclaims.cli.project import Project, open_project
-from evoclaims.cli.running import Execution, choose
+from evoclaims.cli.running import Execution, choose, trials_asked
 from evoclaims.cli.stored_trial import describe
-from evoclaims.core.errors import UserError
 from evoclaims.execution.job import Job
 from evoclaims.execution.worker import WorkOrder
-from evoclaims.judging.exact import MAX_TRIALS
 from evoclaims.paper import references
 from evoclaims.paper.cost import Estimator, Wanted
 from evoclaims.paper.reproduction import Names
@@ -62,12 +60,7 @@ def main(options: argparse.Namespace) -> int:
     project = open_project(options.storage)
     store = project.store
     tier, chosen = choose(project, options)
-    n = options.trials if options.trials is not None else tier.design.last.n
-    if not 1 <= n <= MAX_TRIALS:
-        raise UserError(
-            f"--trials takes 1 to {MAX_TRIALS} trials per condition (no verdict reads more), not {n}. Run "
-            "further seeds by another call, with --first-seed."
-        )
+    n = trials_asked(options, tier)
     seeds = range(options.first_seed, options.first_seed + n)
     for names in chosen[:1]:  # an invalid seed is so for every condition: it is reported once, and nothing is run
         _ = [TrialSpec(tier.condition(*names), seed) for seed in seeds]

@@ -16,6 +16,7 @@ from evoclaims.execution.host import Host
 from evoclaims.execution.job import Job, missing_batches
 from evoclaims.execution.worker import Ended, Opened, WorkOrder, run_jobs
 from evoclaims.execution.workers import Workers, in_queue, seats_of
+from evoclaims.judging.exact import MAX_TRIALS
 from evoclaims.paper.reproduction import Names, Tier
 from evoclaims.report.formatting import plural
 from evoclaims.report.live_line import LiveLine, duration
@@ -45,6 +46,21 @@ def choose(project: Project, options: argparse.Namespace) -> tuple[Tier, list[Na
             f"{', '.join(sorted(' on '.join(names) for names in touched)) or 'none'}."
         )
     return tier, chosen
+
+
+def trials_asked(options: argparse.Namespace, tier: Tier) -> int:
+    """Return how many trials of each condition options ask for: the tier's, unless they name a number.
+
+    Raises:
+        UserError: for a number that no verdict reads.
+    """
+    n: int = tier.design.last.n if options.trials is None else options.trials
+    if not 1 <= n <= MAX_TRIALS:
+        raise UserError(
+            f"--trials takes 1 to {MAX_TRIALS} trials per condition (no verdict reads more), not {n}. Run "
+            "further seeds by `evoclaims run` with --first-seed."
+        )
+    return n
 
 
 def _needed(project: Project, tier: str, known: Sequence[Names]) -> list[Names]:

@@ -16,7 +16,7 @@ from typing import Any, Final
 
 from evoclaims.cli.jobs import active
 from evoclaims.cli.project import Project, open_project
-from evoclaims.cli.running import choose
+from evoclaims.cli.running import choose, trials_asked
 from evoclaims.cluster.job import SIGNAL_SECONDS, BatchJob, JobRequest, clock, requested
 from evoclaims.cluster.submissions import (
     JOB_NAME,
@@ -68,8 +68,8 @@ def main(options: argparse.Namespace) -> int:
 def _plan(
     project: Project, options: argparse.Namespace, request: JobRequest, conditions: Mapping[Job, Condition]
 ) -> list[list[MissingBatch]]:
-    design = project.reproduction.tier(options.tier).design
-    seeds, limit = design.seeds(design.last.n), project.config.seconds(None)
+    tier = project.reproduction.tier(options.tier)
+    seeds, limit = tier.design.seeds(trials_asked(options, tier)), project.config.seconds(None)
     has_gpu = request.gpus or (request.cluster == "local" and gpus("auto"))  # jobs here see what this process sees
     platform = "gpu" if options.device == "gpu" or (options.device == "auto" and has_gpu) else "cpu"
     lacking = missing_batches(project.store, project.reproduction, options.tier, conditions, seeds, limit, platform)
@@ -139,6 +139,7 @@ def _submitted(
     def command(batch: MissingBatch) -> list[str]:
         chosen = [batch.job.method, f"--on={batch.job.task}", f"--tier={options.tier}", f"--device={device}"]
         chosen += [f"--variant={options.variant}"] * bool(options.variant)
+        chosen += [f"--trials={options.trials}"] * bool(options.trials)
         return [sys.executable, "-m", "evoclaims", "run", *chosen, f"--storage={root}"]
 
     folder = folder_of(root, name)
@@ -150,7 +151,8 @@ def _submitted(
         SubmittedJob(id_, tuple(SubmittedBatch(*one.job.names, conditions[one.job].id) for one in job))
         for id_, job in zip(sent, jobs, strict=True)
     )
-    return Submission(SCHEMA, request.cluster, socket.gethostname(), options.tier, made, options.variant)
+    here, trials = socket.gethostname(), options.trials or 0
+    return Submission(SCHEMA, request.cluster, here, options.tier, made, options.variant, trials)
 
 
 def _send(request: JobRequest, folder: Path, requeues: int, work: Sequence[BatchJob]) -> list[str]:

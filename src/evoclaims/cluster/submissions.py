@@ -65,6 +65,7 @@ class Submission:
         tier: of their conditions.
         jobs: all of them.
         variant: of the protocol; empty for itself.
+        trials: per condition; 0 for the tier's number.
     """
 
     schema: Literal[1]
@@ -73,6 +74,7 @@ class Submission:
     tier: Name
     jobs: tuple[SubmittedJob, ...]
     variant: str = ""
+    trials: Annotated[int, Meta(ge=0)] = 0
 
     @property
     def tier_and_variant(self) -> str:
