@@ -62,7 +62,7 @@ def test_an_edited_method_of_the_same_revision_is_told_wherever_its_trials_count
             ("run", "right", "--trials", "0"),
             "--trials takes 1 to 100 trials per condition (no verdict reads more), not 0.",
         ),
-        (("run", "right", "--trials", "101"), "not 101. Run further seeds by another call, with --first-seed."),
+        (("run", "right", "--trials", "101"), "not 101. Run further seeds by `evoclaims run` with --first-seed."),
         (("run", "right", "--first-seed", "-1"), "A seed is a whole number from 0 to 2147483647, not -1."),
         (
             ("run", "right", "--first-seed", "2147483647"),

@@ -85,8 +85,9 @@ def test_a_project_that_is_not_set_up_is_one_sentence(
 
 def test_stored_trials_alone_are_judged_without_running_or_writing_any(project: Any) -> None:
     project.write(a="supported")
-    result = project.run("--claims-stored", own_store=True)
+    result = project.run("--claims-stored", "--junitxml=out.xml", own_store=True)
     assert result.ret == pytest.ExitCode.NO_TESTS_COLLECTED
+    assert 'skipped="1"' in (project.path / "out.xml").read_text()  # a claim that is not run has not passed
     result.stdout.fnmatch_lines(["- a: right on parity: 10 of 10 trials are missing"])
     result.stdout.fnmatch_lines(["No claim was judged: nothing was measured."])
     assert not (project.path / ".evoclaims").exists()

@@ -26,11 +26,11 @@ def main(options: argparse.Namespace) -> int:
     for tier, claim in sorted(before.keys() - now):
         if tier in tiers:
             print(f"kept: {claim} ({tier}), which is no longer among the claims")
+    for line in edits(reports):
+        print(line)
     if not (made.accepted or made.retired):
         print(f"{path} stays as it is: no verdict differs from the accepted one.")
         return 0
-    for line in edits(reports):
-        print(line)
     write_atomically(path, history.dump(made.history).encode())
     for line in made.accepted:
         print(f"accepted: {line}")

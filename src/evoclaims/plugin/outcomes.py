@@ -162,7 +162,9 @@ def _give_outcome(
     failed = claimed.failed or (undecided and not claimed.as_expected)
     # By pytest itself: what xfail(strict=True) expects to fail has not, or a part of the test has.
     failed_by_pytest = report.failed and not (excinfo or failed)
-    if report.when == "setup" and not failed:  # or the test would be called without its fixtures
+    # A test whose setup passed would be called without its fixtures; and without trials nothing has passed.
+    unjudged = claimed.outcome == "not run" and not report.failed
+    if (report.when == "setup" or unjudged) and not failed:
         report.outcome, report.longrepr = "skipped", (item.location[0], item.location[1] or 0, sentence)
     elif not failed_by_pytest:
         report.outcome = "failed" if failed else "passed"
