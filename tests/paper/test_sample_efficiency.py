@@ -313,6 +313,24 @@ def test_a_loop_whose_reports_lie_elsewhere_is_no_slower_one(every: int, reached
     assert judge(ours < theirs, Design.fixed(10)).outcome is outcome
 
 
+def test_a_number_between_two_reports_of_a_loop_decides_nothing() -> None:
+    """Reports of every seventh step are at 14, 21, 28 …: the value is reached from 22 to 28."""
+    condition = Condition(
+        TrainingLoop("its_loops:train", packages=()),
+        PLAIN.task,
+        "whole_budget",
+        Budget(environment_steps=120, reports=12),
+    )
+    kept = [min(at for at in range(7, 400, 7) if at >= ten) for ten in range(10, 121, 10)]
+    curves = {"environment_steps": kept, "fitness": [float(at >= 28) for at in kept], "level": [LAST] * len(kept)}
+    trials = [made(condition, curves, seed, digest="") for seed in range(10)]
+    measure = TrialGroup("its", "small", condition, lambda asked, seeds: trials[: len(seeds)]).steps_to("fitness", 1)
+    verdict = judge(measure > 30, Design.fixed(10))
+    assert (measure.of(trials[0]), verdict.outcome, verdict.p) == (40, Outcome.INCONCLUSIVE, 1.0)
+    assert judge(measure > 20, Design.fixed(10)).outcome is Outcome.SUPPORTED
+    assert judge(measure < 50, Design.fixed(10)).outcome is Outcome.SUPPORTED
+
+
 def test_generations_of_a_training_loop_are_no_environment_steps(group: Any) -> None:
     loop = TrainingLoop("its_loops:train", packages=())
     condition = replace(PLAIN, method=loop, budget=Budget(generations=4, reports=4), progression="whole_budget")

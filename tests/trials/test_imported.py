@@ -110,6 +110,13 @@ def test_no_row_is_left_out_whose_value_is_only_written_otherwise(
         _ = table(text, where={"algo": wanted}).existing
 
 
+def test_rows_that_another_filter_leaves_out_may_be_written_otherwise(table: Callable[..., Imported]) -> None:
+    text = "seed,return,env,lr\n1,5,stones,0.1\n2,6,stones ,0.2\n3,7,maze,0.10000000149\n"
+    assert _values(table(text, where={"env": "stones", "lr": 0.1})) == [5]
+    with pytest.raises(UserError, match="holds 'stones ' in row 2"):
+        _ = table(text, where={"env": "stones"}).existing
+
+
 def test_numbers_that_differ_in_32_bits_and_whole_ones_are_told_apart(table: Callable[..., Imported]) -> None:
     text = "seed,return,run\n1,5,16777216\n2,6,16777217\n3,7,0.1\n4,8, 0.1\n5,9,0.1000001\n6,9,1e300\n7,9,nan\n"
     assert _values(table(text, where={"run": 16777217.0})) == [6]

@@ -53,7 +53,8 @@ def main(options: argparse.Namespace) -> int:
     print(", ".join(f"{count} {state}" for state, count in counts.items() if count))
     if counts["failed"]:
         print(
-            f"`evoclaims submit{project.store.option}` submits what has failed again; it goes on from its checkpoints."
+            f"`evoclaims submit{project.store.option}`, with the same --trials, submits what has failed again; it goes "
+            "on from its checkpoints."
         )
     return int(counts["failed"] > 0)
 

@@ -29,6 +29,8 @@ CODE: Final = "code_hashes"
 DIGITS: Final = 16
 """Of a hash that are kept."""
 
+REGISTRATION: Final = "the registration of "
+
 PARTS: Final = ":"
 """Between the parts of a hash: of the code; of arrays, sets and dataclasses that it names; of other objects."""
 
@@ -81,7 +83,7 @@ def _code(component: Any) -> Iterator[Any]:
         if found := _at(component):
             yield found
         if registered := _contents(getattr(component, "registered", None)):
-            yield f"the registration of {getattr(component, 'name', '')}", content_hash(registered)[:DIGITS]
+            yield REGISTRATION + getattr(component, "name", ""), content_hash(registered)[:DIGITS]
         for field in dataclasses.fields(component):
             yield from _code(getattr(component, field.name))
 
@@ -150,9 +152,9 @@ def _hash(code: Any, parts: frozenset[type]) -> str:
 
     Fields of `parts`, the classes of the components with it, are in ids.
     """
-    code_found, arrays, objects = dict[str, Any](), dict[str, Any](), dict[str, Any]()
+    codes, arrays, objects = dict[str, Any](), dict[str, Any](), dict[str, Any]()
     held, later = [code], list[Any]()
-    found, contained = code_found, arrays
+    found, contained = codes, arrays
     while held or later:
         if not held:  # what is reached through objects alone is a part that older records lack
             held, later = later, []
@@ -161,7 +163,7 @@ def _hash(code: Any, parts: frozenset[type]) -> str:
         one = one if isinstance(one, _Variable) else _bare(one)
         name, tree, module = _read(one)
         # Functions may name each other in circles: each is hashed once.
-        if tree is None or name in code_found or name in objects:
+        if tree is None or name in codes or name in objects:
             continue
         # The syntax tree and not the text, so that a comment or a new layout does not look like an edit.
         found[name] = _as_lists(tree)
@@ -180,8 +182,7 @@ def _hash(code: Any, parts: frozenset[type]) -> str:
         for node, alias in _imports(ast.walk(tree)):  # also within a function
             if source := _imported_from(node, module):
                 later += [_Variable(source, alias.name), getattr(source, alias.name, None)]
-    hashes = (content_hash(part)[:DIGITS] if part else "" for part in (code_found, arrays, objects))
-    return PARTS.join(hashes).rstrip(PARTS)
+    return PARTS.join(content_hash(part)[:DIGITS] if part else "" for part in (codes, arrays, objects)).rstrip(PARTS)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -384,8 +385,7 @@ def _is_in_the_id(statement: ast.AnnAssign) -> bool:
 def _named(tree: ast.Module, module: ModuleType) -> Iterator[tuple[str, Any, _Variable]]:
     """Yield what a module has of the names that code uses, and what modules have that it names as "module.name"."""
     for node in ast.walk(tree):
-        words: list[str] = []
-        held: Any = node
+        words, held = list[str](), node
         while isinstance(held, ast.Attribute):
             words.insert(0, held.attr)
             held = held.value

@@ -102,7 +102,7 @@ class TrialNumbers:
 
 
 def read(scope: Scope, method: str, task: str, measure_of: MeasureOf) -> TrialNumbers:
-    """Read a measure from every trial that verdicts look at: of a condition with a third look, those of that."""
+    """Read a measure from the trials that verdicts look at: those of a third look, wherever all of these are there."""
     group = scope.group(method, task)
     measure, design = measure_of(group), scope.tier.design
     for n in (design.with_third_look().last.n, design.last.n):

@@ -156,11 +156,11 @@ class NumberReading(ScalarReading):
     def signs(self, trials: Trials, number: float) -> list[int | None]:
         """Return of each trial whether its number is above another one (1), at it (0) or below (-1).
 
-        None where that is not known: the trial's reports are at uneven steps, and `number` lies between two of them.
+        None where that is not known: `number` lies between two of the trial's reports.
         """
 
         def sign(trial: TrialResult) -> int | None:
-            above, before = beyond(self.of(trial), number), self.before if self.window.as_reported else None
+            above, before = beyond(self.of(trial), number), self.before if self.window.every else None
             if before and above > 0 and not is_failed(trial) and beyond(before(checked(trial)), number) < 0:
                 return None
             return int(above > 0) - int(above < 0)

@@ -54,6 +54,7 @@ def panels(trials: Sequence[TrialSummary]) -> tuple[tuple[CurvePanel, ...], str]
     if not usable:
         return (), "No trial has a curve of more than one point." if trials else ""
     names = set.intersection(*(set(trial.curves) for trial in usable)) - set(AXES)
+    names = {name for name in names if any(trial.curves[name].reported for trial in usable)}  # of others was no number
     ordered = [name for name in FIRST if name in names] + sorted(names - set(FIRST))
     constant = {name: value for name in ordered if (value := _constant(usable, name)) is not None}
     varying = [name for name in ordered if name not in constant]

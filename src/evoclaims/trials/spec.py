@@ -12,7 +12,7 @@ from typing import Any, Final, Literal, get_args
 from evoclaims.core.canonical import as_plain, content_hash, fields_of, is_own, require_numbers
 from evoclaims.core.errors import UserError, require_known
 from evoclaims.core.packages import ALWAYS, installed, packages_of
-from evoclaims.core.source_code import CODE, code_of, is_edited
+from evoclaims.core.source_code import CODE, REGISTRATION, code_of, is_edited
 from evoclaims.envs.base import Task
 from evoclaims.methods.base import Method, SeldomTested
 from evoclaims.methods.training_loop import TrainingLoop
@@ -152,9 +152,13 @@ class Condition:
     def edited_since(self, trials: Iterable[TrialResult]) -> tuple[str, ...]:
         """Return the project's classes whose code some of these trials ran otherwise, or under another name."""
         recorded = [code for trial in trials if isinstance(code := trial.provenance.get(CODE), Mapping)]
-        return tuple(
-            name for name, now in self.code.items() if any(is_edited(code.get(name), now) for code in recorded)
-        )
+
+        def was_edited(name: str, now: str) -> bool:
+            """Older records have no registrations."""
+            known = [code for code in recorded if name in code or not name.startswith(REGISTRATION)]
+            return any(is_edited(code.get(name), now) for code in known)
+
+        return tuple(name for name, now in self.code.items() if was_edited(name, now))
 
     @property
     def programs(self) -> str:

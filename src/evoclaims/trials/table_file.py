@@ -61,16 +61,11 @@ class TableFile:
             UserError: when a column or a value in it is unknown, when cells hold a value but for how it is written, or
                 no row has all.
         """
-        rows: Sequence[int] = range(self.columns.rows)
-        for name, value in where.items():
-            held = self._rows_by_cell(name)
-            found: set[int] = set()
-            others: list[tuple[Any, list[int]]] = []
-            for cell, at in held.values():
-                if _is(cell, value):
-                    found.update(at)
-                else:
-                    others.append((cell, at))
+        kept = {name: self._kept(name, value) for name, value in where.items()}
+        for name, (found, others) in kept.items():
+            value, held = where[name], self._rows_by_cell(name)
+            elsewhere = [one for other, (one, _) in kept.items() if other != name]
+            others = [(cell, left) for cell, at in others if (left := sorted(set(at).intersection(*elsewhere)))]
             self._require_none_left_out(name, value, others, "but for blanks", _is_but_for_blanks)
             if not found:
                 self._require_text(text for _, text in held)
@@ -80,11 +75,21 @@ class TableFile:
                     known = f" In 32 bits it is equal to {', '.join(rounded)}: write one of these."
                 raise UserError(f"{self.name} has no row whose {name} is {value!r}.{known}")
             self._require_none_left_out(name, value, others, "in 32 bits alone", _is_in_32_bits)
-            rows = sorted(found.intersection(rows))
+        rows = sorted(set(range(self.columns.rows)).intersection(*(found for found, _ in kept.values())))
         if not rows:
             conditions = " and ".join(f"{name} {value!r}" for name, value in where.items())
             raise UserError(f"{self.name} has no row with {conditions}." if where else f"{self.name} has no row.")
-        return list(rows)
+        return rows
+
+    def _kept(self, name: str, value: object) -> tuple[set[int], list[tuple[Any, list[int]]]]:
+        """Return the rows that have a value in a column, and each other cell with its rows."""
+        found, others = set[int](), list[tuple[Any, list[int]]]()
+        for cell, at in self._rows_by_cell(name).values():
+            if _is(cell, value):
+                found.update(at)
+            else:
+                others.append((cell, at))
+        return found, others
 
     def _require_none_left_out(
         self,

@@ -8,6 +8,7 @@ from typing import Final
 
 from evoclaims.core.packages import installed
 from evoclaims.core.printable import printable
+from evoclaims.core.source_code import REGISTRATION
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.source_trials import different, in_words, versions_of
 
@@ -73,6 +74,11 @@ def edited(report: ClaimReport) -> list[str]:
 
 def summary(name: str) -> str:
     """Return a sentence about an edited method or task, without its trials."""
+    if name.startswith(REGISTRATION):
+        return (
+            f"{name} was edited after trials had run, and they still count: if it is another environment now, register "
+            "it under a new name, and they run again"
+        )
     return (
         f"the code of {name} was edited or renamed after trials had run, and they still count: if it computes "
         "something else now, raise its `revision`, and they run again"

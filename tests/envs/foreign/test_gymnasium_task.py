@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
-from typing import Any
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
@@ -26,6 +28,7 @@ from evoclaims.networks.mlp import Mlp
 from evoclaims.trials.runner import run
 from evoclaims.trials.spec import Budget, Condition
 from evoclaims.trials.store import Store
+from evoclaims.verdicts import other_code
 
 CART = GymnasiumTask("CartPole-v1", solved_at=100, examined_episodes=4)
 
@@ -158,11 +161,32 @@ def test_what_an_environment_is_registered_with_is_looked_at(monkeypatch: pytest
     wrapper = gymnasium.envs.registration.WrapperSpec("Clipped", "some.module:Clipped", {"most": 1})
     seen = [
         code_with(kwargs=arguments, **limits)
-        for arguments in ({}, {"goal": 1.0}, {"goal": np.ones(2)}, {"goal": 1.0, "pay": max}, {"goal": Own()})
+        for arguments in (
+            {},
+            {"goal": 1.0},
+            {"goal": np.ones(2)},
+            {"goal": 1.0, "pay": max},
+            {"goal": Own()},
+            {"goal": {"at": [max, 1]}},
+            {"goal": {"at": [max, 2]}},
+            {"goal": {1, 2}},
+            {"goal": np.float32(0.5)},
+            {"goal": Path("a")},
+        )
         for limits in ({}, {"max_episode_steps": 9}, {"wrappers": (wrapper,)})
     ]
     assert len({code["the registration of Own-v0"] for code in seen}) == len(seen)
     assert code_with(kwargs={"goal": np.ones(2)}) == seen[6]
+
+
+def test_a_registration_that_an_older_record_lacks_was_not_edited() -> None:
+    condition = Condition(TrainingLoop(gymnasium.make, packages=()), CART, "whole_budget", Budget(environment_steps=9))
+    told = [
+        condition.edited_since([cast(Any, SimpleNamespace(provenance={"code_hashes": code}))])
+        for code in ({}, dict(condition.code), dict.fromkeys(condition.code, "e" * 16))
+    ]
+    assert told == [(), (), ("the registration of CartPole-v1",)]
+    assert "register it under a new name" in other_code.summary("the registration of CartPole-v1")
 
 
 def test_a_method_that_is_compiled_says_what_to_do_instead(store_of: Store) -> None:

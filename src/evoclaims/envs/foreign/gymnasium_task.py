@@ -7,8 +7,9 @@ import importlib
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from enum import Enum
 from functools import cached_property
-from types import NoneType
+from pathlib import PurePath
 from typing import Any, ClassVar, Final, NoReturn
 
 import gymnasium
@@ -151,13 +152,19 @@ class GymnasiumTask(ForeignTask):
     step = episode = examine = reset
 
 
-def _plain(arguments: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return arguments that can be hashed: of functions and of objects where they, or their classes, are."""
-    held = NoneType, bool, int, float, str, tuple, list, dict, np.ndarray
-    return {
-        word: value if isinstance(value, held) else place_of(value if callable(value) else type(value))
-        for word, value in arguments.items()
-    }
+def _plain(value: Any) -> Any:
+    """Return arguments that can be hashed: of functions and other objects where they, or their classes, are."""
+    if isinstance(value, Mapping):
+        return {str(word): _plain(one) for word, one in value.items()}
+    if isinstance(value, tuple | list):
+        return [_plain(one) for one in value]
+    if isinstance(value, set | frozenset):
+        return sorted(repr(_plain(one)) for one in value)
+    if isinstance(value, np.generic | Enum):
+        return repr(value)
+    if value is None or isinstance(value, bool | int | float | str | np.ndarray):
+        return value
+    return str(value) if isinstance(value, PurePath) else place_of(value if callable(value) else type(value))
 
 
 def _size(space: Any) -> int:

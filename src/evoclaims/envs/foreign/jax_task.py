@@ -154,8 +154,8 @@ class JaxTask(ForeignTask):
     """An environment in jax. A subclass has revision, `make`, `begin`, `advance` and `actions`.
 
     A step after which a number is not finite is undone, and the episode ends, unsolved. If it had rewards below 0, it
-    is paid the lowest of them for each step that it lacks, else nothing: to break an environment never pays. After an
-    action that is NaN the reward is NaN, and so is the return.
+    is paid the lowest of them for each step that it lacks, else nothing: to break an environment pays no more than its
+    worst step so far. After an action that is NaN the reward is NaN, and so is the return.
 
     Attributes:
         episode_steps: environment steps after which an episode is truncated.
