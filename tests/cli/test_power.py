@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from tiny_project import Evoclaims, Project
 
+from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import Store
 
 MAKE = ("power", "--trials=12")
@@ -135,6 +136,12 @@ def test_trials_that_have_not_run_are_not_written(piloted: Evoclaims) -> None:
     assert (status, err.count("\n"), PILOT.exists()) == (2, 1, False)
     assert "left alone: right on parity: 12 of 13 trials are stored, counted from seed 100" in out
     assert piloted(*FEW, "--trials=13", "--first-seed=200", "--stored")[:2] == (2, "")
+
+
+def test_a_pilot_of_code_that_was_edited_is_said(piloted: Evoclaims, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Condition, "edited_since", lambda self, trials: ("its.Network",))
+    said = "right on parity: the code of its.Network was edited or renamed after trials had run"
+    assert said in piloted(*FEW)[1]
 
 
 def test_a_condition_that_breaks_does_not_stop_the_others(piloted: Evoclaims, project: Project) -> None:

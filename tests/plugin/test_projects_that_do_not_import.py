@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-from tiny_project import REPRODUCTION
+from tiny_project import REPRODUCTION, claims
 
 from evoclaims.cli import main
 
@@ -138,3 +139,16 @@ def test_a_claim_whose_file_does_not_import_is_not_called_unknown(
     shown = "\n".join([*result.outlines, *result.errlines])
     assert "ERROR collecting claims/test_others.py" in shown
     assert "no claim named 'H4' in the files that were collected. Other files were not collected; the" in shown
+
+
+def test_claims_of_another_project_are_refused(project: Any, sentence: Any) -> None:
+    """They would be judged by this project's trials."""
+    project.write(a="supported")
+    other = project.path / "other"
+    (other / "claims").mkdir(parents=True)
+    shutil.copy(project.path / "pyproject.toml", other)
+    (other / "claims" / "test_others.py").write_text(claims(z="supported"))
+    assert project.run("claims").ret == 0
+    result = project.run("claims", "other/claims")
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    sentence(result, f"is a claim of the project {other}, and this run judges by {project.path}. Run each project's")

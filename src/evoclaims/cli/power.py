@@ -14,6 +14,7 @@ from evoclaims.cli.running import Execution
 from evoclaims.cli.terminal import styled
 from evoclaims.core.errors import UserError
 from evoclaims.core.packages import recorded
+from evoclaims.core.printable import printable
 from evoclaims.execution.job import Job
 from evoclaims.execution.worker import WorkOrder
 from evoclaims.judging.design import Design
@@ -28,6 +29,7 @@ from evoclaims.report.formatting import number, plural
 from evoclaims.report.table_cells import NONE
 from evoclaims.trials.failed import is_final
 from evoclaims.trials.spec import Condition, TrialSpec
+from evoclaims.verdicts import other_code
 from evoclaims.verdicts.source_trials import change
 
 _OUTCOMES: Final = tuple(outcome for outcome in Outcome if outcome.judged)
@@ -102,6 +104,9 @@ def main(options: argparse.Namespace) -> int:
     console.print_whole(plain_table(HEADINGS, map(cells, powers)))
     for sentence in (*about(powers, design.last.n, which), *troubles(powers)):
         console.print(sentence)
+    for names, condition in wanted.items():
+        for name in () if pilots.unfit(names) else condition.edited_since(pilots.trials[names]):
+            print(printable(f"{' on '.join(names)}: {other_code.summary(name)}"))
     for sentence in _versions(pilots, wanted):
         print(sentence)
     if advice and troubles(powers):

@@ -206,6 +206,7 @@ def pytest_collection_modifyitems(session: pytest.Session, config: pytest.Config
             from evoclaims.claims.claim_names import claim_tests
 
             tests = claim_tests(items)
+            options.check_project(config, tests)
         config.stash[KNOWN] = {test.claim.id for test in tests.values()}
         if _collects_all(session):
             config.stash[COLLECTED] = found = {test.key for test in tests.values()}

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -145,6 +146,25 @@ def _check_root(config: pytest.Config) -> None:
             f"an existing path after a space as a path of tests. Write {' and '.join(spaced)} with =, as "
             f"in {spaced[0]}=PATH."
         )
+
+
+def check_project(config: pytest.Config, items: Iterable[pytest.Item]) -> None:
+    """Refuse claims of another project: they would be judged by this one's methods, tasks, budgets and trials.
+
+    Raises:
+        UserError: when a claim is of another project.
+    """
+    from evoclaims.paper.config import find_root
+
+    for folder, item in {item.path.parent: item for item in items}.items():
+        own = config.rootpath
+        with suppress(UserError):  # no project is said to be broken where its settings are read
+            own = find_root(folder)
+        if own.resolve() != config.rootpath.resolve():
+            raise UserError(
+                f"{item.nodeid} is a claim of the project {own}, and this run judges by {config.rootpath}. "
+                "Run each project's claims on their own."
+            )
 
 
 def _check_changes(config: pytest.Config, changes: str) -> None:
