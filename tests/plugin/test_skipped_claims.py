@@ -126,3 +126,18 @@ def test_a_run_without_claims_leaves_no_old_verdicts_behind(project: Any) -> Non
         "drift": None,
         "upgrade": None,
     }
+
+
+def test_a_claim_that_a_conftest_takes_out_is_not_missing_without_a_word(project: Any, sentence: Any) -> None:
+    project.write(a="supported", b="supported")
+    hook = "def pytest_collection_modifyitems(config, items):\n    last = items.pop()\n"
+    conftest = project.path / "conftest.py"
+    conftest.write_text(hook)
+    result = project.run()
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    sentence(result, "taken claims out of the run without a word: claims/test_claims.py::test_b[b-smoke]. Let it")
+    conftest.write_text(f"{hook}    config.hook.pytest_deselected(items=[last])\n")
+    assert project.run().ret == 0
+    conftest.unlink()
+    assert project.run("-k", "test_a").ret == 0
+    assert project.run("--deselect=claims/test_claims.py::test_b").ret == 0

@@ -108,6 +108,19 @@ def test_what_differs_is_a_new_entry_and_is_said(
     assert len(history[KEY]) == 2
 
 
+def test_an_entry_that_the_same_trials_no_longer_give_is_replaced(store: Store, judged: Report) -> None:
+    """Of a file that was edited, or a judge that computes something else now."""
+    one = judged(_provenance())
+    before, _, _ = _accept(store, {}, one)
+    for p, n in ((0.9, 1), (0.03, 3)):
+        edited = {KEY: (replace(before[KEY][0], p=p, n=n),)}
+        history, accepted, _ = _accept(store, edited, one)
+        said = f"G1 (smoke): still supported, from the same trials with another p or n ({p} of {n} before)"
+        assert (accepted, history[KEY][-1]) == ((said,), before[KEY][0])
+    rounded = {KEY: (replace(before[KEY][0], p=0.03 * (1 + 1e-9)),)}
+    assert _accept(store, rounded, one)[1] == ()
+
+
 def test_new_trials_of_another_revision_alone_are_no_new_entry(store: Store, judged: Report) -> None:
     before, _, _ = _accept(store, {}, judged(_provenance()))
     assert _accept(store, before, judged(_provenance(sha="c" * 40)))[:2] == (before, ())

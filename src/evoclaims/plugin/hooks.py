@@ -224,6 +224,17 @@ def pytest_collection_modifyitems(session: pytest.Session, config: pytest.Config
     if dropped:
         config.hook.pytest_deselected(items=dropped)
         items[:] = [item for item in items if item not in set(dropped)]
+    config.stash[_kept] = {item for item in items if item in tests}
+
+
+_kept: pytest.StashKey[set[pytest.Item]] = pytest.StashKey()
+"""The claim tests that the options select, but for those that are deselected afterwards."""
+
+
+def pytest_deselected(items: Sequence[pytest.Item]) -> None:
+    """Note what pytest's own options, or a plugin, leave out openly."""
+    for item in items:
+        item.config.stash.get(_kept, set()).discard(item)
 
 
 def _collects_all(session: pytest.Session) -> bool:
@@ -251,11 +262,17 @@ def _refuse(config: pytest.Config, items: list[pytest.Item], error: UserError) -
 def pytest_collection_finish(session: pytest.Session) -> None:
     """Check before the first trial that claims can be judged, and put them in order."""
     config = session.config
-    if not any(item.get_closest_marker("claim") for item in session.items) or config.option.collectonly:
+    lost = sorted(item.nodeid for item in config.stash.get(_kept, set()).difference(session.items))
+    if config.option.collectonly or not (lost or any(item.get_closest_marker("claim") for item in session.items)):
         return
     from evoclaims.claims.claim_names import claim_tests
 
     try:
+        if lost:
+            raise UserError(
+                f"A conftest.py or a plugin has taken claims out of the run without a word: {', '.join(lost)}. Let it "
+                "call config.hook.pytest_deselected(items=...), or choose claims by --claims-only."
+            )
         prepare(session, claim_tests(session.items))
     except UserError as error:
         _refuse(config, session.items, error)

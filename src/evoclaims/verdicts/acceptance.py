@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -108,7 +109,16 @@ def difference(old: AcceptedVerdict | None, new: AcceptedVerdict) -> str:
         return f"{old.outcome} -> {new.outcome}{by}"
     if old.reason != new.reason and old.trials != new.trials:
         return f"still {new.outcome}, by other trials{by}"
+    if old.trials == new.trials and not _alike(old, new):  # the judge computes it otherwise, or the file was edited
+        return f"still {new.outcome}, from the same trials with another p or n ({old.p} of {old.n} before){by}"
     return f"still {new.outcome}{by}" if moved else ""
+
+
+def _alike(old: AcceptedVerdict, new: AcceptedVerdict) -> bool:
+    """Whether two entries have the same n, and the same p but for rounding."""
+    if old.p is None or new.p is None:
+        return (old.n, old.p) == (new.n, new.p)
+    return old.n == new.n and math.isclose(old.p, new.p, rel_tol=1e-6, abs_tol=1e-300)
 
 
 def changes(old: AcceptedVerdict, new: AcceptedVerdict) -> list[str]:
