@@ -115,7 +115,8 @@ def test_claims_that_something_leaves_out_are_an_error_and_not_forgotten(evoclai
     Path("conftest.py").write_text(hook)
     status, _, err = evoclaims("accept", "--tier=smoke")
     assert (status, err.count("\n")) == (2, 1)
-    assert " of 3 claims of the smoke tier were collected and not judged (claims/test_claims.py::test_" in err
+    unjudged = " of 3 claims of the smoke tier were collected and not judged (claims/test_claims.py::test_"
+    assert unjudged in err or "taken claims out of the run without a word: claims/test_claims.py::test_b" in err
     assert not Path("verdicts.toml").exists()
 
 
