@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from evoclaims.core.errors import UserError
 from evoclaims.judging.verdict import Outcome, Verdict
-from evoclaims.verdicts.claim_report import ClaimReport, Tally
+from evoclaims.verdicts.claim_report import ClaimReport, Tally, Tried
 from evoclaims.verdicts.transitions import (
     Kind,
     Standing,
@@ -187,3 +187,5 @@ def test_support_that_a_null_agent_has_too_is_no_plain_support_under_a_variant()
     assert (row.plain, row.outcomes) == (Tally.REFUTED, {"x": Tally.VACUOUS, "y": Tally.SUPPORTED})
     (row,) = matrix([vacuous], {"y": [_report("A", Outcome.SUPPORTED, "y")]})
     assert (row.plain, row.hangs_on) == (Tally.VACUOUS, ("y",))
+    (row,) = matrix([replace(vacuous, tried=Tried.SENSITIVE)], {"x": [replace(vacuous, variant="x")]})
+    assert (row.plain, row.outcomes, row.hangs_on) == (Tally.SUPPORTED, {"x": Tally.SUPPORTED}, ())

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final
 
 from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.printable import printable
 from evoclaims.judging.verdict import Outcome
-from evoclaims.verdicts.claim_report import ClaimReport, Tally
+from evoclaims.verdicts.claim_report import ClaimReport, Tally, Tried
 from evoclaims.verdicts.history import History, in_order, key_of
 
 ANY: Final = "*"
@@ -163,10 +163,9 @@ class Robustness:
     Attributes:
         claim: id and parameters, such as "G1[n_parity]".
         tier: "smoke" or "full".
-        plain: what the claim counts as under the protocol itself. Support is vacuous here as elsewhere, but never
-            insensitive: planted faults are not tried under variants.
-        outcomes: the same by variant; a variant that changes none of the claim's trials, or whose trials have not run,
-            is left out.
+        plain: what the claim counts as under the protocol itself, apart from being insensitive.
+        outcomes: the same by variant. No faults are planted there: a claim that notices one under the protocol is not
+            vacuous. A variant that changes none of the claim's trials, or whose trials have not run, is left out.
         fewer: variants that are inconclusive with fewer trials than have decided the protocol's verdict: that may be
             for want of trials.
     """
@@ -201,10 +200,11 @@ def matrix(plain: Sequence[ClaimReport], variants: Mapping[str, Sequence[ClaimRe
         varied = {name: found[key] for name in variants if (key := (report.tier, report.name, name)) in found}
         undecided = {name: one.n for name, one in varied.items() if one.outcome is Outcome.INCONCLUSIVE}
         fewer = {name for name, n in undecided.items() if report.outcome is not Outcome.INCONCLUSIVE and n < report.n}
-        outcomes = {name: _counted(one) for name, one in varied.items()}
-        rows.append(Robustness(report.name, report.tier, _counted(report), outcomes, frozenset(fewer)))
+        outcomes = {name: _counted(one, report.tried) for name, one in varied.items()}
+        counted = _counted(report, report.tried)
+        rows.append(Robustness(report.name, report.tier, counted, outcomes, frozenset(fewer)))
     return tuple(row for row in rows if row.outcomes)
 
 
-def _counted(report: ClaimReport) -> Tally:
-    return Tally.VACUOUS if report.is_vacuous else Tally(report.outcome.value)
+def _counted(report: ClaimReport, tried: Tried) -> Tally:
+    return Tally.VACUOUS if replace(report, tried=tried).is_vacuous else Tally(report.outcome.value)
