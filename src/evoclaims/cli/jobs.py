@@ -52,10 +52,9 @@ def main(options: argparse.Namespace) -> int:
     counts = {name: sum(state == name for _, state, *_ in rows) for name in known}
     print(", ".join(f"{count} {state}" for state, count in counts.items() if count))
     if counts["failed"]:
-        print(
-            f"`evoclaims submit{project.store.option}`, with the same --trials, submits what has failed again; it goes "
-            "on from its checkpoints."
-        )
+        asked = any(state == "failed" and place.submission.trials for place, state, *_ in rows)
+        same = f"{project.store.option}`{', with the same --trials,' * asked}"
+        print(f"`evoclaims submit{same} submits what has failed again; it goes on from its checkpoints.")
     return int(counts["failed"] > 0)
 
 

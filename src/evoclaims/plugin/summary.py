@@ -31,7 +31,7 @@ TROUBLE: Final = "claims_trouble"
 
 
 COLLECTED_THERE: Final = "claims_collected"
-"""Name under which an xdist worker sends its controller the next."""
+"""Name under which an xdist worker sends its controller what `COLLECTED` holds."""
 
 COLLECTED: Final[pytest.StashKey[set[tuple[str, str]]]] = pytest.StashKey()
 """Tier and name of all claims of the project; only in a run that has collected all of them."""

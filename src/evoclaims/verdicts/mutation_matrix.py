@@ -24,7 +24,7 @@ FILE: Final = "mutants.toml"
 SCHEMA: Final = 1
 
 COPIES: Final = "one-seed"
-"""The fault that makes all trials copies, which the judge refuses whatever a claim asserts: it says nothing of one."""
+"""The fault that makes all trials copies. The judge refuses them in any claim, so this fault tests none."""
 
 Part = Literal["method", "task"]
 """What has a fault."""

@@ -160,8 +160,10 @@ def _plain(value: Any) -> Any:
         return [_plain(one) for one in value]
     if isinstance(value, set | frozenset):
         return sorted(repr(_plain(one)) for one in value)
-    if isinstance(value, np.generic | Enum):
-        return repr(value)
+    if isinstance(value, np.generic):  # releases of NumPy write it in several ways
+        value = value.item()
+    if isinstance(value, Enum):
+        return f"{place_of(type(value))}.{value.name}"
     if value is None or isinstance(value, bool | int | float | str | np.ndarray):
         return value
     return str(value) if isinstance(value, PurePath) else place_of(value if callable(value) else type(value))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
@@ -12,7 +13,7 @@ from evoclaims.judging.design import Design
 from evoclaims.judging.exact import sign_test
 from evoclaims.judging.kinds.band import span_of_median
 from evoclaims.judging.reading import NumberReading
-from evoclaims.judging.sample import Trials
+from evoclaims.judging.sample import Sample, Trials
 from evoclaims.judging.verdict import Bound, PValues
 
 Side = Literal["above", "below"]
@@ -58,17 +59,18 @@ class Threshold(Assertion):
 
     def bounds(self, trials: Trials, n: int, design: Design) -> tuple[PValues, PValues]:
         """Bound p by new trials that are all on one side."""
-        toward, away, looked_at = self._counts(trials)
-        new = n - looked_at
+        sample, signs = self.measure.sample(trials), self.measure.signs(trials, self.number)
+        toward, away = self._counts(sample, signs)
+        new = n - len(signs)
         return sign_tests(toward + new, away + new, n), sign_tests(toward, away, n)
 
     def find(self, trials: Trials, design: Design, alpha: float) -> Finding:
         """Run both sign tests."""
-        sample = self.measure.sample(trials)
-        toward, away, n = self._counts(trials)
-        decided = toward + away
+        sample, signs = self.measure.sample(trials), self.measure.signs(trials, self.number)
+        toward, away = self._counts(sample, signs)
+        n, decided = len(signs), toward + away
         undecided = f", {n - decided} at it or without a result, which count for neither" if n > decided else ""
-        if hidden := self.measure.signs(trials, self.number).count(None):
+        if hidden := signs.count(None):
             undecided += f" (of {hidden} it lies between two reports)"
         return self.found(
             sign_tests(toward, away, n),
@@ -80,14 +82,13 @@ class Threshold(Assertion):
             intervals=lambda: (span_of_median(sample),),
         )
 
-    def _counts(self, trials: Trials) -> tuple[int, int, int]:
-        """Return how many trials count for the claim, how many against it, and how many there are."""
-        sample, wanted = self.measure.sample(trials), 1 if self.side == "above" else -1
-        signs = self.measure.signs(trials, self.number)
+    def _counts(self, sample: Sample, signs: Sequence[int | None]) -> tuple[int, int]:
+        """Return how many trials count for the claim, and how many against it."""
+        wanted = 1 if self.side == "above" else -1
         toward = sum(
             sign == wanted and seed not in sample.failed for seed, sign in zip(sample.seeds, signs, strict=True)
         )
-        return toward, signs.count(-wanted), len(signs)
+        return toward, signs.count(-wanted)
 
 
 def sign_tests(toward: int, away: int, n: int) -> PValues:
