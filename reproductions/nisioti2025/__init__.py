@@ -31,6 +31,7 @@ REPRODUCTION = Reproduction(
             conditions={**stepping_gates.SMOKE, **ecorobot.SMOKE, **mechanisms.CONDITIONS},
             design=FIXED_10.for_paper(TRIALS),
             for_drift=MORE,
+            repeat_drift=True,
         ),
         "full": Tier(
             conditions={**stepping_gates.FULL, **ecorobot.FULL, **mechanisms.CONDITIONS},

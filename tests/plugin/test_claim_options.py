@@ -9,6 +9,8 @@ from typing import Any
 
 import pytest
 
+from evoclaims.judging.drift_report import DriftReport, DriftRow
+
 Sentence = Callable[[pytest.RunResult, str], None]
 
 
@@ -165,7 +167,12 @@ def test_a_device_without_enough_memory_is_a_sentence_of_the_claim(
     sentence(result, "The device's memory does not hold 1 trial of hand_built on n_parity at once, and fewer cannot")
 
 
-def test_trials_that_drifted_from_the_committed_ones_fail_the_run(project: Any) -> None:
+_REPEATS = "Tier(conditions(1), Design.fixed(10), repeat_drift=True)"
+
+
+def test_trials_that_drifted_from_the_committed_ones_fail_the_run(
+    project: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The references of the right network are swapped for what other trials gave."""
     from dataclasses import replace
     from pathlib import Path
@@ -201,6 +208,41 @@ def test_trials_that_drifted_from_the_committed_ones_fail_the_run(project: Any) 
     result.stdout.fnmatch_lines(
         ["to the bit: 10 trials compared with the same machine and versions, 10 changed: right on parity (10)"]
     )
+    paper = project.path / "tiny_paper.py"
+    before = paper.read_text()
+    paper.write_text(before.replace("Tier(conditions(1), Design.fixed(10))", _REPEATS))
+    result = project.run(own_store=True)
+    assert result.ret == 1
+    result.stdout.fnmatch_lines(
+        [
+            "evoclaims: right (smoke) has drifted; 3 times as many trials, with fresh seeds, tell this from chance",
+            "DRIFT in right on parity (smoke): mean_success is higher now: *",
+            "  it stands: 30 trials of each condition of right (smoke), with fresh seeds: DRIFT in right on parity *",
+            "failed: trials of right on parity (smoke) (drift)",
+        ]
+    )
+    none = DriftReport((DriftRow("right on parity (smoke)", "mean_success", 30, 10, "no drift"),), 0.05)
+    monkeypatch.setattr("evoclaims.claims.earlier_trials.check_drift", lambda cases, alpha: none)
+    result = project.run("--claims-json=verdicts.json", own_store=True)
+    assert result.ret == 0
+    result.stdout.fnmatch_lines(
+        [
+            "reference trials: * comparisons, 0 drifted*",
+            "not repeated: right on parity (smoke): mean_success: median 0.5 -> 1, A12 = 1.00, p = * (Holm)",
+            "failed: nothing",
+        ]
+    )
+    rows = json.loads((project.path / "verdicts.json").read_text())["drift"]["rows"]
+    assert {row["status"] for row in rows} == {"not repeated"}
+
+    def interrupt(cases: object, alpha: float) -> DriftReport:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("evoclaims.claims.earlier_trials.check_drift", interrupt)
+    result = project.run(own_store=True)
+    assert result.ret == 1
+    result.stdout.fnmatch_lines(["  it stands: this was interrupted; the same command goes on from there"])
+    paper.write_text(before)
     for options in (("--claims-stored",), ("--claims-stored", "--claims-committed")):
         result = project.run(*options, own_store=True)
         assert result.ret == 1

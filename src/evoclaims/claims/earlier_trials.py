@@ -5,15 +5,17 @@ from __future__ import annotations
 import itertools
 import math
 from collections import defaultdict
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from evoclaims.claims.fetching import StoredOnly
+from evoclaims.claims.fetching import NotStoredError, RunMissing, StoredOnly
 from evoclaims.claims.session import Session
 from evoclaims.core.canonical import content_hash
+from evoclaims.core.errors import UserError
 from evoclaims.core.packages import agree, recorded
-from evoclaims.judging.drift import changed_settings
+from evoclaims.core.provenance import same_bits
+from evoclaims.judging.drift import DriftCase, by_one_code, changed_settings, check_drift
 from evoclaims.judging.drift_report import DigestCheck, DriftReport
 from evoclaims.paper import pilots, references
 from evoclaims.trials.result import TrialResult
@@ -25,6 +27,12 @@ from evoclaims.verdicts.upgrade import Succession, Upgrade, predecessors, upgrad
 
 MOST: Final = 10_000
 """Most combinations of stored conditions that are tried for one claim."""
+
+TIMES: Final = 3
+"""How many times as many trials repeat a drift as have shown it: they hardly ever miss a true one."""
+
+ALPHA_REPEATED: Final = 0.05
+"""Of the repetition. Chance alone drifts and does so again in 1 of 2,000 runs."""
 
 NAMES: Final = (("method", "name"), ("task", "name"), ("imported", "file"), ("imported", "where"))
 """Where a specification has what an edit seldom changes together: names, or which rows of a table are read."""
@@ -47,27 +55,93 @@ class _Used:
     again: set[int] = field(default_factory=set)
     reads: set[str] = field(default_factory=set)
 
+    @property
+    def label(self) -> str:
+        return f"{self.method} on {self.task} ({self.tier})"
+
+    @property
+    def family(self) -> str:
+        """What is tested for drift together: all conditions of a method."""
+        return f"{self.method} ({self.tier})"
+
 
 def drift(session: Session, reports: Sequence[ClaimReport]) -> tuple[DriftReport, DigestCheck]:
     """Compare the trials behind `reports` with the committed reference trials of their tiers."""
-    folder = session.reproduction.folder
-    cases = [
-        references.paired(
-            f"{used.method} on {used.task} ({used.tier})",
-            trials,
-            _reference(session, used),
-            method=f"{used.method} ({used.tier})",
-            reads=used.reads,
-            pilot=[
-                trial
-                for trial in pilots.both(folder, used.tier, used.method, used.task, used.condition.id)
-                if trial.id not in {new.id for new in trials}
-            ],
-        )
-        for used in _used(session, reports)
-        if (trials := _trials(session, used))
-    ]
+    cases = [_case(session, used, trials) for used in _used(session, reports) if (trials := _trials(session, used))]
     return references.compare(cases)
+
+
+def repeated(
+    session: Session, reports: Sequence[ClaimReport], found: DriftReport, say: Callable[[str], None]
+) -> DriftReport:
+    """Test methods that drifted once more, with trials of fresh seeds, at tiers that ask for it (`repeat_drift`).
+
+    Of a hundred runs in which nothing changed, one drifts; on a machine of the same kind, each later run then makes
+    the same trials and drifts, too. A drift that the fresh trials do not show is "not repeated" and fails no run. It
+    stands where they cannot be made as the run's own trials were, or cannot be compared. `say` receives a sentence
+    before they run.
+    """
+    drifted = {row.label for row in found.rows if row.drifted}
+    tested = {row.label for row in found.rows if row.p is not None}
+    every = [used for used in _used(session, reports) if used.label in tested]
+    asking = {name for name, tier in session.reproduction.tiers.items() if tier.repeat_drift}
+    for family in sorted({used.family for used in every if used.label in drifted and used.tier in asking}):
+        mine = [used for used in every if used.family == family]
+        try:
+            if not session.only_reads:
+                _check_makes_alike(session, mine)
+                say(f"{family} has drifted; {TIMES} times as many trials, with fresh seeds, tell this from chance")
+            fresh = [_fresh(session, used) for used in mine]
+        except (UserError, NotStoredError) as error:
+            found = found.standing(f"there are no trials of {family} with fresh seeds: {error}")
+            continue
+        cases = [_case(session, used, trials) for used, trials in zip(mine, fresh, strict=True)]
+        found = found.repeated_by(check_drift(cases, ALPHA_REPEATED), family, {used.label for used in mine})
+    return found
+
+
+def _case(session: Session, used: _Used, trials: Sequence[TrialResult]) -> DriftCase:
+    """Return some trials of a condition beside its reference trials and pilots."""
+    reference, new = _reference(session, used), {trial.id for trial in trials}
+    pilot = [trial for trial in _pilot(session, used) if trial.id not in new]
+    return references.paired(used.label, trials, reference, method=used.family, reads=used.reads, pilot=pilot)
+
+
+def _check_makes_alike(session: Session, several: Sequence[_Used]) -> None:
+    """Refuse conditions whose fresh trials would be imported, or not made as their others were.
+
+    Raises:
+        UserError: which says why.
+    """
+    for used in several:
+        if used.condition.existing:
+            raise UserError(f"those of {used.label} are imported")
+        if any(trial.provenance.get("device", {}).get("platform") != "cpu" for trial in _trials(session, used)):
+            raise UserError(f"they run on CPUs, and those of {used.label} did not")
+    if isinstance(session.fetch, RunMissing) and not session.fetch.has_time_for_drift:
+        raise UserError("they run on CPUs, and not under a time limit below an hour")
+
+
+def _fresh(session: Session, used: _Used) -> Sequence[TrialResult]:
+    """Return trials of a condition with seeds that none of its others has, made as the judged ones were.
+
+    Raises:
+        UserError: when they cannot be made so.
+        NotStoredError: when they may not be run.
+    """
+    condition, trials, fetch = used.condition, _trials(session, used), session.fetch
+    if condition.existing:
+        raise UserError(f"those of {used.label} are imported.")
+    if isinstance(fetch, RunMissing) and not fetch.has_time_for_drift:
+        raise UserError("they are made on CPUs alone, and not under a time limit below an hour.")
+    first = 1 + max(trial.seed for trial in (*trials, *_reference(session, used), *_pilot(session, used)))
+    fresh = fetch(condition, range(first, first + TIMES * len(trials)))
+    alike = (
+        by_one_code(one, other) and same_bits(one.provenance, other.provenance) for one in fresh for other in trials
+    )
+    if not all(alike):
+        raise UserError(f"those of {used.label} were made on another machine, with other versions, or by other code.")
+    return fresh
 
 
 def upgraded(session: Session, reports: Sequence[ClaimReport]) -> Upgrade:
@@ -86,9 +160,8 @@ def upgraded(session: Session, reports: Sequence[ClaimReport]) -> Upgrade:
         before = predecessors([record for several in others for record in several], condition.packages)
         if now and before and len(now) == len(trials):
             old = recorded(before[0].provenance, condition.packages)
-            label = f"{used.method} on {used.task} ({used.tier})"
-            method, reads = f"{used.method} ({used.tier})", tuple(sorted(used.reads))
-            successions.append(Succession(label, old, here, before, now, len(used.again), method, reads))
+            reads = tuple(sorted(used.reads))
+            successions.append(Succession(used.label, old, here, before, now, len(used.again), used.family, reads))
     return upgrade(successions)
 
 
@@ -117,6 +190,11 @@ def _reference(session: Session, used: _Used) -> tuple[TrialResult, ...]:
     if any(trial.condition == used.condition.id for trial in own):
         return own
     return references.of_condition(session.reproduction.references, *names, used.condition.id) or own
+
+
+def _pilot(session: Session, used: _Used) -> tuple[TrialResult, ...]:
+    """Return the committed pilots of a condition."""
+    return pilots.both(session.reproduction.folder, used.tier, used.method, used.task, used.condition.id)
 
 
 def _trials(session: Session, used: _Used) -> list[TrialResult]:

@@ -43,9 +43,14 @@ def more_for_drift(
         platform: where they will run: "cpu" or "gpu".
     """
     more = known.get(condition, range(0))
-    if not more or more[0] - 1 not in seeds or time_limit < 3600 or platform != "cpu":
+    if not more or more[0] - 1 not in seeds or not _has_time(time_limit, platform):
         return ()
     return [seed for seed in more if seed not in seeds]
+
+
+def _has_time(time_limit: float, platform: str) -> bool:
+    """Whether trials that no claim reads are made; their bits must not depend on what else is in a batch."""
+    return time_limit >= 3600 and platform == "cpu"
 
 
 @dataclass(frozen=True)
@@ -119,6 +124,11 @@ class RunMissing:
             time_limit=self.time_limit,
             any_version=self.any_version,
         )
+
+    @property
+    def has_time_for_drift(self) -> bool:
+        """Whether trials are made that only the drift check reads."""
+        return _has_time(self.time_limit, devices.choose(self.device)[0].platform)
 
     def more(self, condition: Condition, seeds: Sequence[int]) -> Sequence[int]:
         """Return the seeds for the drift check that are made with `seeds` (see `more_for_drift`)."""

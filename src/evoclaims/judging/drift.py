@@ -164,7 +164,7 @@ def _prepared(case: DriftCase) -> tuple[list[Columns], list[DriftRow]]:
     before = {trial.seed: trial.digest for trial in reference}
     again = [trial for trial in new if trial.seed in before]  # of other seeds there is nothing to compare bits with
     alike = [trial for trial in again if trial.digest and before[trial.seed] == trial.digest]
-    if again and len(alike) == len(again) and all(_by_one_code(again[0], trial) for trial in new):
+    if again and len(alike) == len(again) and all(by_one_code(again[0], trial) for trial in new):
         return [], every("no drift", "the same trials to the bit")
     pilot = [trial for trial in case.pilot if trial.status == "done"]
     known = [metric for metric in case.metrics if pilot and all(_has(trial, metric) for trial in pilot)]
@@ -178,7 +178,7 @@ def _prepared(case: DriftCase) -> tuple[list[Columns], list[DriftRow]]:
     return [], constant[:1]
 
 
-def _by_one_code(one: TrialResult, other: TrialResult) -> bool:
+def by_one_code(one: TrialResult, other: TrialResult) -> bool:
     """Whether two trials were made by the same code, as far as they tell: a store may mix those of several versions."""
     return all(one.provenance.get(part) == other.provenance.get(part) for part in ("versions", "git", CODE))
 

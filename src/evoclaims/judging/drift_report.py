@@ -13,8 +13,9 @@ from evoclaims.trials.result import TrialResult
 FOUND: Final = 0.95
 """Probability with which a shift is called detectable."""
 
-DriftStatus = Literal["no drift", "drift", "underpowered", "no reference", "not run", "error"]
-"""Only "no drift" is a pass; "underpowered": no values could have shown drift after the correction."""
+DriftStatus = Literal["no drift", "drift", "not repeated", "underpowered", "no reference", "not run", "error"]
+"""Only "no drift" is a pass. "not repeated": a drift that more trials, with fresh seeds, have not shown again;
+"underpowered": no values could have shown drift after the correction."""
 
 
 @dataclass(frozen=True)
@@ -74,12 +75,14 @@ class DriftReport:
         edited: a clause for each edited table.
         detectable: by method that was tested, the shift of all its conditions, in standard deviations, that this
             check finds with a probability of 0.95.
+        repetitions: what trials with fresh seeds of methods that drifted have shown, or why there are none.
     """
 
     rows: tuple[DriftRow, ...]
     alpha: float
     edited: tuple[str, ...] = ()
     detectable: Mapping[str, float] = field(default_factory=dict)
+    repetitions: tuple[str, ...] = ()
 
     @property
     def drifted(self) -> bool:
@@ -96,8 +99,9 @@ class DriftReport:
         """A line for each row that drifted, each edited table, and each condition that could not be checked."""
         edited = [f"EDITED {line}" for line in self.edited]
         drifted = [f"DRIFT in {row.in_words}" for row in self.rows if row.drifted]
+        drifted += [f"not repeated: {row.in_words}" for row in self.rows if row.status == "not repeated"]
         unchecked = (f"not checked: {row.label}: {row.detail or row.status}" for row in self.unchecked)
-        return [*drifted, *edited, *dict.fromkeys(unchecked)]
+        return [*drifted, *self.repetitions, *edited, *dict.fromkeys(unchecked)]
 
     @property
     def counts(self) -> str:
@@ -108,8 +112,9 @@ class DriftReport:
 
     @property
     def nearest(self) -> DriftRow | None:
-        """The tested row with the smallest p of its method, and then of its own; None if nothing was tested."""
+        """The tested row with the smallest p of its method, and then of its own; None without one that stands."""
         tested = [row for row in self.rows if row.p_holm is not None and row.p is not None]
+        tested = [row for row in tested if row.status != "not repeated"]
         return min(tested, key=lambda row: (row.p_holm, row.p), default=None)
 
     @property
@@ -127,6 +132,21 @@ class DriftReport:
         near = f"no drift shown; nearest: {self.nearest.in_words}" if self.nearest else "no drift shown"
         return f"{near}; found would have been {self.limits}" if self.limits else near
 
+    def repeated_by(self, again: DriftReport, method: str, labels: Collection[str]) -> DriftReport:
+        """Return this report once trials with fresh seeds were tested, of all conditions of a method that drifted."""
+        numbers = sorted({row.n_new for row in again.rows})
+        several = " to ".join(str(number) for number in dict.fromkeys((numbers[0], numbers[-1])))
+        fresh = f"{several} trials of each condition of {method}, with fresh seeds"
+        if again.drifted or again.unchecked:
+            return self.standing(f"{fresh}: {again.lines[0]}")
+        mine = {row for row in self.rows if row.drifted and row.label in labels}
+        rows = [replace(row, status="not repeated") if row in mine else row for row in self.rows]
+        return replace(self, rows=tuple(rows), repetitions=(*self.repetitions, f"  {fresh}: {again.undecided}"))
+
+    def standing(self, why: str) -> DriftReport:
+        """Return this report with the reason why a drift stands."""
+        return replace(self, repetitions=(*self.repetitions, f"  it stands: {why}"))
+
     def about(self, labels: Collection[str]) -> DriftReport:
         """Return the part about some conditions."""
         return replace(self, rows=tuple(row for row in self.rows if row.label in labels))
@@ -134,7 +154,7 @@ class DriftReport:
     @property
     def unchecked(self) -> tuple[DriftRow, ...]:
         """Rows that show neither drift nor no drift; they do not pass."""
-        return tuple(row for row in self.rows if row.status not in ("no drift", "drift"))
+        return tuple(row for row in self.rows if row.status not in ("no drift", "drift", "not repeated"))
 
     def to_json(self) -> dict[str, Any]:
         """Return the report as strict JSON."""

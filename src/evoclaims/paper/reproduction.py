@@ -105,6 +105,8 @@ class Tier:
         for_drift: by method and task, how many more trials a run of claims makes on CPUs, with the seeds after the
             design's. Only the drift check reads them. They run in the same batch, which compiles nothing for them: of a
             condition with cheap trials, they show a smaller shift for little time.
+        repeat_drift: whether a run in which a method drifted makes three times as many trials of it with fresh seeds,
+            on CPUs; a drift that these do not show fails no run.
         name: such as "smoke"; the reproduction gives it.
         others: what the reproduction's other tiers have, by name; the reproduction gives them, for errors.
     """
@@ -112,6 +114,7 @@ class Tier:
     conditions: Mapping[tuple[str, str], Condition]
     design: Design
     for_drift: Mapping[tuple[str, str], int] = field(default_factory=dict, kw_only=True)
+    repeat_drift: bool = field(default=False, kw_only=True)
     name: str = field(default="", kw_only=True, compare=False, repr=False)
     others: Mapping[str, Collection[Names]] = field(default_factory=dict, kw_only=True, compare=False, repr=False)
 

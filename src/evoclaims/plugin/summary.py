@@ -16,6 +16,7 @@ from evoclaims.core.errors import UserError
 from evoclaims.core.printable import shown, spelled
 from evoclaims.core.tiers import TIERS
 from evoclaims.plugin.options import make_session
+from evoclaims.plugin.progress import progress_of
 
 if TYPE_CHECKING:
     from evoclaims.judging.drift_report import DigestCheck, DriftReport
@@ -105,6 +106,8 @@ class Summary:
             self.reports = history.ordered(self._last_runs())
             with self._telling():
                 self._drift = drift(make_session(self._config), self.reports)
+                if session.exitstatus != pytest.ExitCode.INTERRUPTED:
+                    self._drift = self._repeated(self._drift[0]), self._drift[1]
             with self._telling():
                 self._upgrade = upgraded(make_session(self._config), self.reports)
             with self._telling():
@@ -136,6 +139,19 @@ class Summary:
             yield
         except UserError as error:
             self.report_trouble(str(error))
+
+    def _repeated(self, found: DriftReport) -> DriftReport:
+        """Test methods that drifted once more, where they are to be told from chance; Ctrl-C ends only this."""
+        from evoclaims.claims.earlier_trials import repeated
+
+        line = progress_of(self._config)
+        try:
+            return repeated(make_session(self._config), self.reports, found, line.remark if line else print)
+        except KeyboardInterrupt:
+            return found.standing("this was interrupted; the same command goes on from there")
+        finally:
+            if line:
+                line.close()
 
     def _compare_with_accepted(self) -> None:
         """Compare the verdicts with the last accepted ones, which are for the protocol itself, not for a variant."""
