@@ -32,7 +32,7 @@ TIMES: Final = 3
 """How many times as many trials repeat a drift as have shown it: they hardly ever miss a true one."""
 
 ALPHA_REPEATED: Final = 0.05
-"""Of the repetition. Chance alone drifts and does so again in 1 of 2,000 runs."""
+"""Of the repetition. Both tests have the same earlier trials; how often chance passes both is in docs/judging.md."""
 
 NAMES: Final = (("method", "name"), ("task", "name"), ("imported", "file"), ("imported", "where"))
 """Where a specification has what an edit seldom changes together: names, or which rows of a table are read."""
