@@ -19,6 +19,7 @@ from evoclaims.core.environments import Environment, Recipe, installed_here
 from evoclaims.envs.gates.parity import NParity
 from evoclaims.judging.verdict import Outcome
 from evoclaims.methods.hand_built import HandBuilt
+from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Budget, Condition
 from evoclaims.trials.store import Store
 from evoclaims.verdicts.across import Judged
@@ -112,6 +113,33 @@ def test_a_release_whose_trials_cannot_be_compared_has_not_stayed_the_same(
     status, out, _ = evoclaims(*BISECT[: -len(RELEASES)], "1.2", "1.4", "1.5")
     assert f"The {kind} of a changed after pebble 1.2 and not later than 1.5; unknown between them:\n" in out
     assert f"  pebble 1.4: not all of its trials can be compared with those of pebble 1.0 for {kind}\n" in out
+
+
+@pytest.mark.parametrize(("changes", "said"), [(True, "1.2 was still as 1.0"), (False, "9 trials the same to the bit")])
+def test_what_no_release_lets_compare_is_said_beside_what_stayed(
+    evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch, changes: bool, said: str
+) -> None:
+    """One trial of ten is from another machine in each release but the first."""
+    condition = Condition(HandBuilt(), NParity(2), "direct", Budget(generations=1, reports=1))
+
+    def judge(self: Elsewhere, recipe: Recipe) -> Judged:
+        moved = 0.001 * (changes and recipe.version >= "1.3")
+
+        def one(seed: int) -> TrialResult:
+            machine = "other" if seed == 9 and recipe.version > "1.0" else "Linux"
+            made = {"device": {"platform": "cpu", "kind": "cpu"}, "machine": machine}
+            return trial_of(
+                condition, seed, seed / 10 + moved, provenance={**made, "versions": {"pebble": recipe.version}}
+            )
+
+        source = SourceTrials("ours", "parity", condition.id, (), {"pebble": (recipe.version,)}, ())
+        trials = {source.label: tuple(map(one, range(10)))}
+        return Judged(recipe.label, {"a": report("a", sources=(source,))}, trials)
+
+    monkeypatch.setattr(Elsewhere, "judge", judge)
+    status, out, _ = evoclaims(*BISECT, "--by=bits")
+    assert status == (not changes)
+    assert f"{said} (the bits of ours on parity can be compared in part or not at all).\n" in out
 
 
 def test_where_nothing_changed_the_status_says_so(evoclaims: Evoclaims, outcomes: dict[str, str]) -> None:

@@ -115,7 +115,8 @@ def main(options: argparse.Namespace) -> int:
             return None
         return False
 
-    _tell(bisect(len(releases), has_changed), releases, tried, package, kind, options.claim, why)
+    unseen = _in_part(kind, never_compared)
+    _tell(bisect(len(releases), has_changed), releases, tried, package, kind, options.claim, why, unseen)
     return 0
 
 
@@ -128,6 +129,12 @@ def _uncompared(cells: Collection[Cell], kind: str) -> set[tuple[str, str]]:
     return {one for cell in cells for one in UNCOMPARED[kind](cell)}
 
 
+def _in_part(kind: str, uncompared: Collection[tuple[str, str]]) -> str:
+    """Return in parentheses where something may have changed unseen; empty if all was compared."""
+    labels = sorted({label for label, _ in uncompared})
+    return f" (the {kind} of {', '.join(labels)} can be compared in part or not at all)" if labels else ""
+
+
 def _unchanged(first: Judged, last: Judged, kinds: Collection[str]) -> str:
     """Return in words what of these kinds is the same at both ends, as far as it could be compared."""
     cells = _cells(first, last)
@@ -138,6 +145,10 @@ def _unchanged(first: Judged, last: Judged, kinds: Collection[str]) -> str:
         "drift": "no drift shown" if tested else "no trials tested for drift",
         "bits": f"{plural(compared, 'trial')} the same to the bit" if compared else "no trial compared to the bit",
     }
+    if compared:
+        found["bits"] += _in_part("bits", _uncompared(cells, "bits"))
+    if tested:
+        found["drift"] += _in_part("drift", _uncompared(cells, "drift"))
     if all(cell.same for cell in cells):
         found |= dict.fromkeys(("drift", "bits"), "the same trials, since none depends on it")
     return ", ".join(dict.fromkeys(found[kind] for kind in kinds))
@@ -156,6 +167,7 @@ def _tell(
     kind: str,
     claim: str,
     why: Mapping[int, str],
+    unseen: str,
 ) -> None:
     """Print where it changed, what is known about it, why it is not for the others, and how many environments ran."""
     before, after, what = releases[change.before], releases[change.after], f"The {kind} of {claim}"
@@ -167,5 +179,5 @@ def _tell(
             print(f"  {tried[index].label}: {why[index]}")
     else:
         still = "shows no drift from" if kind == "drift" else "was still as"
-        print(f"{what} changed in {package} {after}; {before} {still} {releases[0]}.")
+        print(f"{what} changed in {package} {after}; {before} {still} {releases[0]}{unseen}.")
     print(f"environments: {len(tried)}, for {len(releases)} releases")
