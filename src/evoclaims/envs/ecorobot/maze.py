@@ -24,7 +24,7 @@ Area = tuple[tuple[float, float], tuple[float, float]]
 """Lowest and highest x, lowest and highest y, m."""
 
 CELLS: Final = (50, 50)
-"""The grid over which coverage is counted (§4 of the paper)."""
+"""The grid over which coverage is counted (§A.5 of the paper)."""
 FINE: Final = 4
 """Points along each side of a cell for computing reachability."""
 
