@@ -201,7 +201,7 @@ def test_map_elites_collects_few_stones(trials, verdict):
 
 @claim.smoke(
     "S5",
-    says="MAP-Elites collects about as little reward as PPO: both more than a random policy, but far less than NEAT",
+    says="MAP-Elites collects about as little reward as PPO: both more than a random policy, but less than NEAT",
 )
 def test_map_elites_collects_as_little_as_ppo(trials, verdict):
     methods = ("map_elites", "ppo", "neat", "random_policy")
