@@ -124,7 +124,7 @@ def _conditions(size: Size) -> Conditions:
         "ppo": dict.fromkeys(tasks, size.ppo),
         "goal_ppo": dict.fromkeys(tasks, size.ppo),
         "map_elites": dict.fromkeys(tasks, size.map_elites),
-        # Control C3: no learning.
+        # Control C3, and a null agent: no learning.
         "random_policy": dict.fromkeys(tasks, RandomPolicy()),
         # Control C4: no training.
         "waypoints": dict.fromkeys(tasks, Waypoints()),
@@ -186,7 +186,9 @@ FULL = _conditions(
             ),
             "goal_ppo": {STONES: _LEARNING},
             "map_elites": _generations(stones=1_000, deceptive_maze_difficult=1_000),
-            "random_policy": {CHEETAH_RUN: _LOOK, ANT_RUN: _LOOK},
+            "random_policy": dict.fromkeys(
+                (STONES, STONES_ANT, EASY, EASY_ANT, DIFFICULT, HIERARCHICAL, MEDIUM, HIGH, CHEETAH_RUN, ANT_RUN), _LOOK
+            ),
             "waypoints": {STONES: _LOOK},
         },
     )
