@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -83,6 +84,13 @@ def full_arrays(condition: Condition) -> Numbers | None:
     return {"metrics": {}, "levels": {}, "curves": sizes}
 
 
+def without_training(task: Any) -> Any:
+    """Return a task without what a policy that is not trained does not notice: sampled rows, and a goal's direction."""
+    if isinstance(task, Circuit):
+        return replace(task, sampling="exhaustive")  # type: ignore[type-var]
+    return replace(task, shows_goal=False) if isinstance(task, SteppingStones) else task
+
+
 def _nothing_solved(success: float) -> dict[str, float]:
     """Return metrics of a trial that ends at its first level."""
     return {"last_success": success, "mean_success": success, "furthest_solved": -1.0, "furthest_reached": 0.0}
@@ -91,7 +99,9 @@ def _nothing_solved(success: float) -> dict[str, float]:
 NULL_AGENTS = {
     "no action": NullAgent("a robot that takes no action", no_action),
     "constant circuit": NullAgent("the best circuit that always gives the same answer", constant_circuit),
-    "random policy": NullAgent("a network with random weights", method="random_policy"),
-    "random search": NullAgent("random search, with the evaluations of CMA-ES", method="random_search"),
+    "random policy": NullAgent("a network with random weights", method="random_policy", meets=without_training),
+    "random search": NullAgent(
+        "random search, with the evaluations of CMA-ES", method="random_search", meets=without_training
+    ),
     "full arrays": NullAgent("a network that fills the arrays of its genome", full_arrays, everywhere=True),
 }

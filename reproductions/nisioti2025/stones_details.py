@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from evoclaims import Budget, Condition
 from evoclaims.envs import ANT, DeceptiveMaze, RobotTask, SteppingStones
-from evoclaims.methods import CmaEs, HyperNeat, MapElites, Neat, Ppo, RandomPolicy, SeldomDecomposedCmaEs
+from evoclaims.methods import CmaEs, HyperNeat, MapElites, Neat, Ppo, SeldomDecomposedCmaEs
 from evoclaims.networks import AllSkips
 from reproductions.nisioti2025 import ecorobot
 from reproductions.nisioti2025.first_level_ppo import FirstLevelPpo
@@ -65,7 +65,7 @@ def start_noise(share: float) -> Change:
 
     def change(method: str, task: str, condition: Condition) -> Condition | None:
         asked = condition.task
-        if not isinstance(asked, SteppingStones) or isinstance(condition.method, Waypoints | RandomPolicy):
+        if not isinstance(asked, SteppingStones) or isinstance(condition.method, Waypoints):
             return None
         robot, noise = asked.robot, (share * asked.robot.position_noise, share * asked.robot.velocity_noise)
         return replace(

@@ -1,7 +1,8 @@
 """The protocol at the time of the paper: what the authors' scripts of April 2025 run, as far as they say it.
 
 Two details among stones the scripts leave open, so that there are four members: what stones pay, and from where they
-count. This file was committed before any of its trials ran.
+count. This file was committed before any of its trials ran; that networks with random weights have its stones, too, is
+of 2026-11-29.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from typing import Any, Final, Literal
 
 from evoclaims import Budget, Condition
 from evoclaims.envs import ANT, RobotTask, SteppingStones
-from evoclaims.methods import HyperNeat, Neat, RandomPolicy
+from evoclaims.methods import HyperNeat, Neat
 from reproductions.nisioti2025 import ecorobot, stones_details
 from reproductions.nisioti2025.other_stones import MetreRanges
 from reproductions.nisioti2025.published_course import SURFACE
@@ -29,7 +30,7 @@ def _stones(pays: Literal["each", "once"], within: float) -> Change:
 
     def change(method: str, task: str, condition: Condition) -> Condition | None:
         asked: Any = condition.task
-        if not isinstance(asked, SteppingStones) or isinstance(condition.method, Waypoints | RandomPolicy):
+        if not isinstance(asked, SteppingStones) or isinstance(condition.method, Waypoints):
             return None
         told = {"toward": "after_next", "ends": "near_target", "sensor": MetreRanges(), "surface": SURFACE}
         if asked.robot == ANT:

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from evoclaims.claims.claim import Claim, ClaimTest
+from evoclaims.claims.null_agents import answers
 from evoclaims.claims.session import Session
 from evoclaims.core.errors import UserError
 from evoclaims.judging.assertion import Assertion
@@ -16,6 +17,11 @@ from evoclaims.paper.reproduction import NullAgent, Reproduction
 from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import Store
 from evoclaims.verdicts.claim_report import CONTROL, ClaimReport
+
+
+def _as_it_is(task: Any) -> Any:
+    return task
+
 
 Put = Callable[..., ClaimReport]
 
@@ -102,6 +108,26 @@ def test_an_agent_that_is_a_method_is_not_run_for_it(put: Put) -> None:
     report = put(_stays, chance=NullAgent("the worse one", method="worse"))
     assert (report.satisfied_by, report.unasked) == ((), (("chance", "only stored trials are asked for"),))
     assert "unasked" not in report.to_json()  # records of verdicts stay as they are
+
+
+ELSEWHERE = "it is run on another instance of the task"
+
+
+@pytest.mark.parametrize(
+    ("on", "meets", "answer"),
+    [("small", _as_it_is, True), ("small", type, True), ("large", _as_it_is, ELSEWHERE), ("large", type, True)],
+)
+def test_an_agent_that_is_a_method_stands_only_for_the_task_that_it_meets(
+    reproduction: Reproduction, store: Store, served: Any, on: str, meets: Callable[[Any], Any], answer: Any
+) -> None:
+    """A method may have another instance under the same name, with other rewards, say."""
+    session = Session(reproduction, store, served(_value))
+    design, agents = session.design("full"), {"chance": NullAgent("the worse one", method="worse", meets=meets)}
+    says = session.group("better", "small", "full").does_not_solve_the_last_level.stays()
+    found = answers(
+        agents, says, design.last, design, session.trials_of, lambda method, task: session.group(method, on, "full")
+    )
+    assert found == {"chance": answer}
 
 
 @pytest.mark.parametrize("fields", [{}, {"method": "worse", "numbers": _still}])

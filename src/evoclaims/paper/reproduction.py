@@ -51,6 +51,10 @@ Numbers = Mapping[str, Mapping[str, Any]]
 """What a record has in each of its parts (metrics, levels, curves), by name."""
 
 
+def _as_it_is(task: Any) -> Any:
+    return task
+
+
 @dataclass(frozen=True)
 class NullAgent:
     """Something that has not learnt what claims are about, such as a robot that takes no action.
@@ -63,6 +67,8 @@ class NullAgent:
         numbers: a function from a condition to the metrics, levels and curves of the agent's trials, or to None if the
             agent cannot stand for it.
         method: a method of the same tier whose committed trials on the same task are its trials.
+        meets: returns a task without what makes no difference to that method's trials; where two of one name still
+            differ, as methods may have instances of their own, the agent does not stand for the condition.
         everywhere: True if it only stands for all conditions of an assertion at once; False if it also stands for the
             claimed ones alone, beside the trials of the others (see `claims.null_agents`).
 
@@ -73,6 +79,7 @@ class NullAgent:
     says: str
     numbers: Callable[[Condition], Numbers | None] | None = None
     method: str = ""
+    meets: Callable[[Any], Any] = _as_it_is
     everywhere: bool = False
 
     def __post_init__(self) -> None:
