@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 from collections.abc import Callable
 from shutil import rmtree
 from typing import Any
@@ -236,7 +237,8 @@ def test_trials_that_drifted_from_the_committed_ones_fail_the_run(
     assert {row["status"] for row in rows} == {"not repeated"}
 
     def interrupt(cases: object, alpha: float) -> DriftReport:
-        raise KeyboardInterrupt
+        signal.raise_signal(signal.SIGINT)
+        return none
 
     monkeypatch.setattr("evoclaims.claims.earlier_trials.check_drift", interrupt)
     result = project.run(own_store=True)

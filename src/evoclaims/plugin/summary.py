@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shlex
+import signal
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,6 +18,7 @@ from evoclaims.core.printable import shown, spelled
 from evoclaims.core.tiers import TIERS
 from evoclaims.plugin.options import make_session
 from evoclaims.plugin.progress import progress_of
+from evoclaims.trials.stopping import interrupted_by
 
 if TYPE_CHECKING:
     from evoclaims.judging.drift_report import DigestCheck, DriftReport
@@ -146,7 +148,8 @@ class Summary:
 
         line = progress_of(self._config)
         try:
-            return repeated(make_session(self._config), self.reports, found, line.remark if line else print)
+            with interrupted_by(signal.SIGINT):  # which is only answered while a run ends, and this may take long
+                return repeated(make_session(self._config), self.reports, found, line.remark if line else print)
         except KeyboardInterrupt:
             return found.standing("this was interrupted; the same command goes on from there")
         finally:
