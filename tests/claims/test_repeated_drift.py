@@ -180,3 +180,12 @@ def test_a_store_that_cannot_be_written_lets_the_drift_stand(repeat: Repeat, ses
     found, _, _ = repeat(_as_before, replace(session, fetch=refuse))
     assert found.drifted
     assert found.repetitions[0].endswith("with fresh seeds: the disk is full")
+
+
+def test_what_a_method_raises_is_a_sentence_and_no_traceback(repeat: Repeat, session: Session) -> None:
+    def fail(condition: Condition, seeds: Sequence[int]) -> Sequence[TrialResult]:
+        raise RuntimeError("out of order")
+
+    found, _, _ = repeat(_as_before, replace(session, fetch=fail))
+    assert found.drifted
+    assert "with fresh seeds: RuntimeError: out of order (" in found.repetitions[0]

@@ -12,7 +12,7 @@ from typing import Any, Final
 from evoclaims.claims.fetching import NotStoredError, RunMissing, StoredOnly
 from evoclaims.claims.session import Session
 from evoclaims.core.canonical import content_hash
-from evoclaims.core.errors import UserError
+from evoclaims.core.errors import UserError, in_one_line
 from evoclaims.core.packages import agree, recorded
 from evoclaims.core.provenance import same_bits
 from evoclaims.judging.drift import DriftCase, by_one_code, changed_settings, check_drift
@@ -92,8 +92,10 @@ def repeated(
                 _check_makes_alike(session, mine)
                 say(f"{family} has drifted; {TIMES} times as many trials, with fresh seeds, tell this from chance")
             fresh = [_fresh(session, used) for used in mine]
-        except (UserError, NotStoredError) as error:
-            found = found.standing(f"there are no trials of {family} with fresh seeds: {error}")
+        except Exception as error:  # what a method raises, say: the verdicts are there, and must not be lost by it
+            known = isinstance(error, UserError | NotStoredError)
+            why = str(error) if known else in_one_line(error, session.reproduction.folder)
+            found = found.standing(f"there are no trials of {family} with fresh seeds: {why}")
             continue
         cases = [_case(session, used, trials) for used, trials in zip(mine, fresh, strict=True)]
         found = found.repeated_by(check_drift(cases, ALPHA_REPEATED), family, {used.label for used in mine})
