@@ -147,6 +147,17 @@ def test_trials_of_a_gpu_are_not_repeated_on_a_processor(repeat: Repeat) -> None
     assert "they run on CPUs, and those of better on small (smoke) did not" in found.repetitions[0]
 
 
+def test_code_that_was_not_committed_may_have_been_edited_since(repeat: Repeat, session: Session) -> None:
+    dirty = {"git": {"sha": "a" * 40, "dirty": True}}
+    condition = session.group("better", "small", "smoke").condition
+    for seed in range(LAST_PILOT + 1, LAST_PILOT + 19):
+        session.store.put(_made(condition, seed, _as_before(seed), **dirty), {})
+    for now in (session, replace(session, fetch=StoredOnly(Archive(session.store)))):
+        found, asked, said = repeat(_as_before, now, trials=dirty, **dirty)
+        assert (found.drifted, asked, said) == (True, [], [])
+        assert found.repetitions[0].endswith("were made by code that was not committed, and may differ now")
+
+
 def test_none_run_under_a_time_limit_or_where_trials_are_only_read(repeat: Repeat, session: Session) -> None:
     limited = replace(session, fetch=RunMissing(session.store, "cpu", ignore, time_limit=60.0))
     read = replace(session, fetch=StoredOnly(Archive(session.store)))

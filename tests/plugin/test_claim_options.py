@@ -178,10 +178,13 @@ def test_trials_that_drifted_from_the_committed_ones_fail_the_run(
     from dataclasses import replace
     from pathlib import Path
 
+    from evoclaims.core import provenance
     from evoclaims.paper import references
     from evoclaims.trials.result import digest
     from evoclaims.trials.store import Store
 
+    known = {**provenance.collect(), "git": None}  # where code is not committed no drift is repeated
+    monkeypatch.setattr(provenance, "_collected", lambda: known)
     project.write(a="supported")
     assert project.run(own_store=True).ret == 0
     path = references.path_of(project.path / "reference", "smoke", "right", "parity")

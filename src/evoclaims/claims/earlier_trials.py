@@ -88,8 +88,8 @@ def repeated(
     for family in sorted({used.family for used in every if used.label in drifted and used.tier in asking}):
         mine = [used for used in every if used.family == family]
         try:
+            _check_makes_alike(session, mine)
             if not session.only_reads:
-                _check_makes_alike(session, mine)
                 say(f"{family} has drifted; {TIMES} times as many trials, with fresh seeds, tell this from chance")
             fresh = [_fresh(session, used) for used in mine]
         except Exception as error:  # what a method raises, say: the verdicts are there, and must not be lost by it
@@ -118,8 +118,11 @@ def _check_makes_alike(session: Session, several: Sequence[_Used]) -> None:
     for used in several:
         if used.condition.existing:
             raise UserError(f"those of {used.label} are imported")
-        if any(trial.provenance.get("device", {}).get("platform") != "cpu" for trial in _trials(session, used)):
+        made = [trial.provenance for trial in _trials(session, used)]
+        if any(one.get("device", {}).get("platform") != "cpu" for one in made):
             raise UserError(f"they run on CPUs, and those of {used.label} did not")
+        if any((one.get("git") or {}).get("dirty") for one in made):  # edited again, it would look the same
+            raise UserError(f"those of {used.label} were made by code that was not committed, and may differ now")
     if isinstance(session.fetch, RunMissing) and not session.fetch.has_time_for_drift:
         raise UserError("they run on CPUs, and not under a time limit below an hour")
 
@@ -127,15 +130,13 @@ def _check_makes_alike(session: Session, several: Sequence[_Used]) -> None:
 def _fresh(session: Session, used: _Used) -> Sequence[TrialResult]:
     """Return trials of a condition with seeds that none of its others has, made as the judged ones were.
 
+    It is one that may have such trials (see `_check_makes_alike`).
+
     Raises:
         UserError: when they cannot be made so.
         NotStoredError: when they may not be run.
     """
     condition, trials, fetch = used.condition, _trials(session, used), session.fetch
-    if condition.existing:
-        raise UserError(f"those of {used.label} are imported.")
-    if isinstance(fetch, RunMissing) and not fetch.has_time_for_drift:
-        raise UserError("they are made on CPUs alone, and not under a time limit below an hour.")
     first = 1 + max(trial.seed for trial in (*trials, *_reference(session, used), *_pilot(session, used)))
     fresh = fetch(condition, range(first, first + TIMES * len(trials)))
     alike = (
