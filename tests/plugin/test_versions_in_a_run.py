@@ -11,9 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tiny_project import trials_of
+from tiny_project import out_of_time, trials_of
 
-from evoclaims.trials.result import digest
+from evoclaims.paper import references
+from evoclaims.trials.result import Status, digest
 from evoclaims.trials.store import Store
 
 HERE = version("numpy")
@@ -144,6 +145,24 @@ def test_whatever_is_there_is_judged_and_the_table_says_that_its_versions_are_mi
     page = (project.path / "page.md").read_text()
     assert "inconclusive†" in page
     assert "† trials of mixed versions" in page
+
+
+@pytest.mark.parametrize("status", ["crashed", "timeout"])
+def test_drift_is_that_of_the_judged_trials_and_not_of_newer_ones_without_an_end(
+    project: Any, aged: Callable[..., None], status: Status
+) -> None:
+    aged(0)
+    store = Store(project.path / ".evoclaims")
+    sound = trials_of(store, "hand_built")
+    references.write(references.path_of(project.path / "reference", "smoke", "right", "parity"), sound)
+    aged(10)
+    for trial in sound:
+        store.put(replace(out_of_time(trial), status=status, digest=digest(status, {}, {}, trial.curves, b"")), {})
+    lines = _lines(project.run("--claims-any-version", own_store=True))
+    assert any(
+        line.startswith("DRIFT in right on parity (smoke): mean_success is lower now: median 1 -> 0.25")
+        for line in lines
+    )
 
 
 def test_trials_of_one_other_environment_are_told_with_what_is_installed(

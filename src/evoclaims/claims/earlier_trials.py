@@ -9,7 +9,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from evoclaims.claims.fetching import NotStoredError, RunMissing, StoredOnly
+from evoclaims.claims.fetching import NotStoredError, RunMissing
 from evoclaims.claims.session import Session
 from evoclaims.core.canonical import content_hash
 from evoclaims.core.errors import UserError, in_one_line
@@ -18,6 +18,7 @@ from evoclaims.core.provenance import same_bits
 from evoclaims.judging.drift import DriftCase, by_one_code, changed_settings, check_drift
 from evoclaims.judging.drift_report import DigestCheck, DriftReport
 from evoclaims.paper import pilots, references
+from evoclaims.paper.archive import Archive
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import DamagedFileError
@@ -202,7 +203,8 @@ def _pilot(session: Session, used: _Used) -> tuple[TrialResult, ...]:
 
 def _trials(session: Session, used: _Used) -> list[TrialResult]:
     """Return the stored trials that a condition's claims were judged from, and those for the drift check alone."""
-    get = session.fetch.archive.stored if isinstance(session.fetch, StoredOnly) else session.store.get
+    place = session.judged_from
+    get = place.stored if isinstance(place, Archive) else place.get
 
     def stored(trials: Collection[str]) -> list[TrialResult]:
         found = (get(trial, used.condition.versions) for trial in sorted(trials))

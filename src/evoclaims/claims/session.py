@@ -78,7 +78,11 @@ class Session:
     @property
     def judged_from(self) -> Archive | Store:
         """Where `get` returns the record of a trial that was judged, if it has several."""
-        return self.fetch.archive if isinstance(self.fetch, StoredOnly) else self.store
+        if isinstance(self.fetch, StoredOnly):
+            return self.fetch.archive
+        # Of any versions, one that came to its end comes before one of these versions that did not.
+        any_version = isinstance(self.fetch, RunMissing) and self.fetch.any_version
+        return Archive(self.store) if any_version else self.store
 
     @property
     def only_reads(self) -> bool:
