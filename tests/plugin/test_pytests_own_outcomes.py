@@ -32,6 +32,24 @@ def test_a_supported_claim_that_a_strict_xfail_expects_to_fail_fails_in_pytests_
     result.stdout.fnmatch_lines(["*XPASS(strict)*"])
 
 
+@pytest.mark.parametrize("workers", [(), ("-n1",)])
+@pytest.mark.parametrize(
+    ("mark", "end"),
+    [("", "pytest.skip('known')"), ("", "pytest.xfail('known')"), ("@pytest.mark.xfail\n", "raise OSError('known')")],
+)
+def test_what_ends_a_test_after_its_verdict_does_not_hide_it(
+    project: Any, mark: str, end: str, workers: tuple[str, ...]
+) -> None:
+    project.write(
+        f"{mark}@says('a')\ndef test_a(trials, verdict):\n    {REFUTED}\n    {end}\n\n\n"
+        f"@says('b')\ndef test_b(trials, verdict):\n    {SUPPORTED}\n"
+    )
+    result = project.run("--claims-json=out.json", *workers)
+    assert (result.ret, _outcomes(project)) == (1, ["error", "supported"])
+    assert {"skipped", "xfailed"}.isdisjoint(result.parseoutcomes())
+    result.stdout.fnmatch_lines(["*known*"])
+
+
 FIXTURE = f"""
 @pytest.fixture
 def broken():

@@ -50,6 +50,8 @@ def shortened(excinfo: pytest.ExceptionInfo[BaseException], item: pytest.Item) -
 P_NAMES: Final = {"for": "p", "against": "p_refuted", "against its size": "p_smaller"}
 """Names of the p that decides, as in the tables of `evoclaims status`, by its direction."""
 
+_SKIPPING: Final = (pytest.skip.Exception, pytest.xfail.Exception)
+
 VERDICTS: pytest.StashKey[VerdictFixture] = pytest.StashKey()
 """Under which a claim's test keeps what its fixture `verdict` has judged."""
 
@@ -128,7 +130,7 @@ def pytest_runtest_makereport(
     claimed = _claim_report(item, call.excinfo, report)
     state.claimed = claimed.to_json()
     setattr(report, ATTRIBUTE, state.claimed)
-    if not report.skipped:
+    if not report.skipped or claimed.outcome != "not run":
         _give_outcome(item, call.excinfo, report, claimed)
     return report
 
@@ -168,7 +170,7 @@ def _give_outcome(
         report.outcome, report.longrepr = "skipped", (item.location[0], item.location[1] or 0, sentence)
     elif not failed_by_pytest:
         report.outcome = "failed" if failed else "passed"
-        if excinfo is None or excinfo.errisinstance(UserError):
+        if excinfo is None or excinfo.errisinstance((UserError, *_SKIPPING)):
             report.longrepr = shown(sentence) if failed else None
         else:
             report.longrepr = shortened(excinfo, item) or report.longrepr
@@ -201,17 +203,21 @@ def _claim_report(
     if because := _gap(item):
         reason = f"it has no {test.tier} test: {because}"
         return session.skipped(unjudged(test, Outcome.NOT_RUN, reason, has_test=False))
-    if report.skipped:  # or failed as an xfail mark expects
+    judged = item.stash[_state].called and verdicts is not None and verdicts.report is not None
+    if report.skipped and not judged:  # or failed as an xfail mark expects
         sentence = (
             report.longrepr[2] if isinstance(report.longrepr, tuple) else f"xfail: {getattr(report, 'wasxfail', '')}"
         )
         why = sentence.removeprefix("Skipped: ") or "no reason given"
         return session.skipped(unjudged(test, Outcome.NOT_RUN, f"its test was skipped ({why})"))
-    if excinfo is not None and excinfo.errisinstance(pytest.skip.Exception):
+    if excinfo is not None and excinfo.errisinstance(pytest.skip.Exception) and not judged:
         return session.skipped(unjudged(test, Outcome.NOT_RUN, f"its test was skipped ({excinfo.value})"))
     if excinfo is not None and isinstance(excinfo.value, pytest.FixtureLookupError) and excinfo.value.argname:
         lacking = f"There is no fixture named {excinfo.value.argname!r}: a claim takes trials and verdict."
         claimed = unjudged(test, Outcome.ERROR, lacking)
+    elif excinfo is not None and judged and excinfo.errisinstance(_SKIPPING):
+        late = f"the test was skipped ({excinfo.value}) after verdict(...), which this would hide: skip it before"
+        claimed = unjudged(test, Outcome.ERROR, late)
     elif excinfo is not None:
         claimed = broken(test, excinfo.value, item.config.rootpath)
     elif verdicts is None or verdicts.report is None:
