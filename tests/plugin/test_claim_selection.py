@@ -175,9 +175,30 @@ class Stones:
 """
 
 
+MADE = CLASS.replace("class Stones:", "class TestStones:\n    def __init__(self):\n        self.stones = 7\n")
+DATA = f"from dataclasses import dataclass\n\n@dataclass{CLASS.replace('Stones:', 'TestStones:    # of what is set')}"
+HEIR = CLASS + "    def __new__(cls):\n        return object.__new__(cls)\n\nclass TestStones(Stones):\n    pass\n"
+ABSTRACT = f"""
+import abc
+{CLASS.replace("Stones:", "TestStones(abc.ABC):")}
+    import abc
+
+    @abc.abstractmethod
+    def stones(self): ...
+"""
+LAMBDA = "test_a = says('a')(lambda trials, verdict: None)\n"
+PARTIAL = "import functools\ntest_a = says('a')(functools.partial(print))\n"
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
+        (MADE, "the class TestStones has a function with @claim(...), and pytest takes none with __init__ for one of"),
+        (DATA, "the class TestStones has a function with @claim(...), and pytest takes none with __init__ for one of"),
+        (HEIR, "the class TestStones has a function with @claim(...), and pytest takes none with __new__ for one of"),
+        (ABSTRACT, "the class TestStones has a function with @claim(...), and pytest takes no abstract class for one"),
+        (LAMBDA, "which pytest takes for no test, so that it would never be judged. Write it above `def test_"),
+        (PARTIAL, "@claim('a', ...) is above functools.partial(<built-in function print>), which pytest takes for no"),
         (CHECK, "the function check_a has @claim(...), and pytest takes none of this name for a test, so that"),
         (TWO, "The tests of the claims a and b have one name, test_it, so that the second replaces the first"),
         (CLASS, "the class Stones has a function with @claim(...), and pytest takes none of this name for one of"),
@@ -216,7 +237,15 @@ def test_tests_without_claims_are_left_alone(project: Any) -> None:
     assert not (project.path / ".evoclaims").exists()
 
 
-@pytest.mark.parametrize("more", ["    __test__ = False\n", "\nclass TestStones(Stones):\n    pass\n"])
-def test_a_class_that_is_left_out_on_purpose_or_has_an_heir_is_not_refused(project: Any, more: str) -> None:
-    project.write(CLASS + more)
+@pytest.mark.parametrize(
+    "text",
+    [
+        f"{CLASS}    __test__ = False\n",
+        f"{CLASS}\nclass TestStones(Stones):\n    pass\n",
+        f"{MADE}    __test__ = False\n",
+        f"{ABSTRACT}\nclass TestThese(TestStones):\n    stones = None\n",
+    ],
+)
+def test_a_class_that_is_left_out_on_purpose_or_has_an_heir_is_not_refused(project: Any, text: str) -> None:
+    project.write(text)
     assert project.run().ret in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED)

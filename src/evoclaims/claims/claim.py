@@ -123,8 +123,8 @@ class _ClaimMark:
             since: when that reading was written, such as "2026-11-26" or "2026-11-26 14:30" (UTC).
 
         Raises:
-            UserError: when a text is missing, `since` is not a date, `because` would have to explain two things, or the
-                test replaces that of another claim.
+            UserError: when a text is missing, `since` is not a date, `because` would have to explain two things, the
+                test replaces that of another claim, or it is no function.
         """
         stated = {} if smoke in (None, "") else {"smoke": smoke}
         _check_texts("The claim", claim_id, says=says, where=where, **stated)
@@ -176,6 +176,12 @@ def _attached(claim_id: str, marks: list[pytest.MarkDecorator]) -> Callable[[F],
     """Return the decorator that puts marks on a claim's test."""
 
     def attach(function: F) -> F:
+        named = inspect.unwrap(getattr(function, "__func__", function))
+        if not inspect.isclass(named) and (not inspect.isfunction(named) or named.__name__ == "<lambda>"):
+            raise UserError(
+                f"@claim({claim_id!r}, ...) is above {function!r}, which pytest takes for no test, so that it would "
+                "never be judged. Write it above `def test_...(trials, verdict):`."
+            )
         if (here := inspect.currentframe()) is not None and here.f_back is not None:
             _check_name(claim_id, function, here.f_back.f_locals)
         for mark in marks:

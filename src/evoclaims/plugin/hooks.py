@@ -83,11 +83,9 @@ def pytest_pycollect_makeitem(
 ) -> Sequence[pytest.Item] | None:
     """Put smoke tests in their claims' places; refuse a claim that pytest does not collect under the run's settings."""
     if inspect.isclass(obj):
-        if any(map(_is_claim, vars(obj).values())) and _is_left_out(collector, name, obj):
-            begun = " or ".join(collector.config.getini("python_classes"))
+        if why := _why_left_out(collector, name, obj):
             raise collector.CollectError(
-                f"{collector.nodeid}: the class {name} has a function with @claim(...), and pytest takes none of this "
-                f"name for one of tests, so that its claim would never be judged: begin its name with {begun}."
+                f"{collector.nodeid}: the class {name} has a function with @claim(...), and pytest takes {why}."
             )
         return None
     if not _is_claim(obj):
@@ -121,15 +119,25 @@ def _is_claim(obj: object) -> bool:
     return inspect.isfunction(obj) and any(mark.name == "claim" for mark in getattr(obj, "pytestmark", ()))
 
 
-def _is_left_out(collector: pytest.Module | pytest.Class, name: str, one: type) -> bool:
-    """Whether pytest collects no tests from a class that was written here: neither its own nor as those of an heir."""
-    return (
-        one.__module__ == collector.module.__name__
-        and getattr(one, "__test__", True)
-        and not collector.classnamefilter(name)
-        and not issubclass(one, unittest.TestCase)
-        and not one.__subclasses__()
-    )
+def _why_left_out(collector: pytest.Module | pytest.Class, name: str, one: type) -> str:
+    """Return why pytest collects no tests from a class with claims, neither its own nor as those of an heir."""
+    if not getattr(one, "__test__", True) or issubclass(one, unittest.TestCase):
+        return ""
+    lost = "so that its claim would never be judged"
+    here, is_test = one.__module__ == collector.module.__name__, collector.classnamefilter(name)
+    if here and not is_test and _has_claims(one) and not one.__subclasses__():
+        begun = " or ".join(collector.config.getini("python_classes"))
+        return f"none of this name for one of tests, {lost}: begin its name with {begun}"
+    if not is_test or not any(map(_has_claims, one.__mro__)):
+        return ""
+    if inspect.isabstract(one):
+        return "" if one.__subclasses__() else f"no abstract class for one of tests, {lost}: write an heir of it"
+    made = [word for word in ("__init__", "__new__") if getattr(one, word) is not getattr(object, word)]
+    return f"none with {made[0]} for one of tests, {lost}: use fixtures instead" if made else ""
+
+
+def _has_claims(one: type) -> bool:
+    return any(map(_is_claim, vars(one).values()))
 
 
 @pytest.hookimpl(tryfirst=True)
