@@ -186,6 +186,8 @@ import abc
     @abc.abstractmethod
     def stones(self): ...
 """
+AGAIN = "\n@says('a')\ndef test_a(trials, verdict):\n    pass\n\ndef test_a():\n    pass\n"
+CLASS_AGAIN = CLASS.replace("Stones", "TestStones") + "\nclass TestStones:\n    pass\n"
 LAMBDA = "test_a = says('a')(lambda trials, verdict: None)\n"
 PARTIAL = "import functools\ntest_a = says('a')(functools.partial(print))\n"
 
@@ -197,6 +199,8 @@ PARTIAL = "import functools\ntest_a = says('a')(functools.partial(print))\n"
         (DATA, "the class TestStones has a function with @claim(...), and pytest takes none with __init__ for one of"),
         (HEIR, "the class TestStones has a function with @claim(...), and pytest takes none with __new__ for one of"),
         (ABSTRACT, "the class TestStones has a function with @claim(...), and pytest takes no abstract class for one"),
+        (AGAIN, "the name of the test of a, or of its class, is given again below, so that it would never be judged"),
+        (CLASS_AGAIN, "the name of the test of a, or of its class, is given again below, so that it would never be"),
         (LAMBDA, "which pytest takes for no test, so that it would never be judged. Write it above `def test_"),
         (PARTIAL, "@claim('a', ...) is above functools.partial(<built-in function print>), which pytest takes for no"),
         (CHECK, "the function check_a has @claim(...), and pytest takes none of this name for a test, so that"),

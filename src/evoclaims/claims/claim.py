@@ -172,6 +172,10 @@ def _check_texts(what: str, claim_id: object, **texts: object) -> None:
             raise UserError(f"{what} {claim_id or '(without id)'} lacks its {word}.")
 
 
+TESTS: Final[list[tuple[str, Callable[..., Any]]]] = []
+"""The id and the test of each claim that this process has read, also of those that nothing names any more."""
+
+
 def _attached(claim_id: str, marks: list[pytest.MarkDecorator]) -> Callable[[F], F]:
     """Return the decorator that puts marks on a claim's test."""
 
@@ -186,6 +190,7 @@ def _attached(claim_id: str, marks: list[pytest.MarkDecorator]) -> Callable[[F],
             _check_name(claim_id, function, here.f_back.f_locals)
         for mark in marks:
             function = mark(function)
+        TESTS.append((claim_id, named))
         return function
 
     return attach

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import ast
+import inspect
 import re
 from collections.abc import Collection, Iterable, Sequence
+from functools import cache
+from types import ModuleType
 from typing import Any, Final
 
 import pytest
 
-from evoclaims.claims.claim import ClaimTest
+from evoclaims.claims.claim import TESTS, ClaimTest
 from evoclaims.core.errors import UnknownNameError, UserError
 
 
@@ -30,6 +34,32 @@ def note_repetitions(metafunc: pytest.Metafunc) -> list[str]:
 
     metafunc.parametrize = noting  # type: ignore[method-assign]
     return repeats
+
+
+@cache  # it is asked for each name of a module
+def replaced(module: ModuleType) -> str:
+    """Return a sentence about claims whose tests, or their classes, have the name of a later function or class.
+
+    That of a later claim's test is an error of `@claim(...)` already.
+    """
+    lines = {one.__code__.co_firstlineno: name for name, one in TESTS if _is_of(one, module)}
+    lost, bodies = list[str](), [ast.parse(inspect.getsource(module)).body] if lines else []
+    for body in bodies:
+        last = {one.name: one for one in body if isinstance(one, _NAMED)}
+        bodies += [one.body for one in last.values() if isinstance(one, ast.ClassDef)]
+        for one in body:
+            if isinstance(one, _NAMED) and one is not last[one.name]:
+                first = min([one.lineno, *(mark.lineno for mark in one.decorator_list)])
+                lost += [name for line, name in lines.items() if first <= line <= (one.end_lineno or first)]
+    which = f"the name of the test of {', '.join(lost)}, or of its class, is given again below"
+    return f"{which}, so that it would never be judged: rename it." if lost else ""
+
+
+_NAMED: Final = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
+
+
+def _is_of(one: Any, module: ModuleType) -> bool:
+    return inspect.isfunction(one) and one.__globals__ is vars(module)
 
 
 def claim_tests(items: Iterable[pytest.Item]) -> dict[pytest.Item, ClaimTest]:

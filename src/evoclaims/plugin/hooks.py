@@ -9,6 +9,7 @@ import ast
 import inspect
 import os
 import signal
+import sys
 import unittest
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
@@ -82,6 +83,11 @@ def pytest_pycollect_makeitem(
     collector: pytest.Module | pytest.Class, name: str, obj: object
 ) -> Sequence[pytest.Item] | None:
     """Put smoke tests in their claims' places; refuse a claim that pytest does not collect under the run's settings."""
+    if isinstance(collector, pytest.Module) and "evoclaims.claims.claim" in sys.modules:
+        from evoclaims.claims.claim_names import replaced
+
+        if lost := replaced(collector.obj):
+            raise collector.CollectError(f"{collector.nodeid}: {lost}")
     if inspect.isclass(obj):
         if why := _why_left_out(collector, name, obj):
             raise collector.CollectError(
