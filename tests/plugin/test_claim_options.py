@@ -240,12 +240,15 @@ def test_trials_that_drifted_from_the_committed_ones_fail_the_run(
     assert {row["status"] for row in rows} == {"not repeated"}
 
     def interrupt(cases: object, alpha: float) -> DriftReport:
+        written.extend(json.loads((project.path / "verdicts.json").read_text())["drift"]["rows"])
         signal.raise_signal(signal.SIGINT)
         return none
 
+    written: list[dict[str, Any]] = []
     monkeypatch.setattr("evoclaims.claims.earlier_trials.check_drift", interrupt)
-    result = project.run(own_store=True)
+    result = project.run("--claims-json=verdicts.json", own_store=True)
     assert result.ret == 1
+    assert {row["status"] for row in written} == {"drift"}  # a run that is killed now has told its verdicts
     result.stdout.fnmatch_lines(["  it stands: this was interrupted; the same command goes on from there"])
     paper.write_text(before)
     for options in (("--claims-stored",), ("--claims-stored", "--claims-committed")):

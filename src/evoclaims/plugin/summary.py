@@ -108,10 +108,12 @@ class Summary:
             self.reports = history.ordered(self._last_runs())
             with self._telling():
                 self._drift = drift(make_session(self._config), self.reports)
-                if session.exitstatus != pytest.ExitCode.INTERRUPTED:
-                    self._drift = self._repeated(self._drift[0]), self._drift[1]
             with self._telling():
                 self._upgrade = upgraded(make_session(self._config), self.reports)
+            with self._telling():
+                if self._drift and self._drift[0].drifted and session.exitstatus != pytest.ExitCode.INTERRUPTED:
+                    self._write_json()  # a run may be killed while it repeats the drift
+                    self._drift = self._repeated(self._drift[0]), self._drift[1]
             with self._telling():
                 self._compare_with_accepted()
             with self._telling():
