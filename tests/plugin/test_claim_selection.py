@@ -221,11 +221,21 @@ def test_a_claim_that_would_not_be_collected_is_a_sentence(
         assert "a" in {report["claim"] for report in project.json()["claims"]}
 
 
-def test_claims_in_a_file_that_pytest_takes_for_none_of_tests_are_a_sentence(project: Any, sentence: Sentence) -> None:
+@pytest.mark.parametrize(
+    ("imported", "mark"),
+    [
+        ("from evoclaims import claim", "claim"),
+        ("from evoclaims import claim", "claim.smoke"),
+        ("from evoclaims import claim as states", "states"),
+        ("import evoclaims", "evoclaims.claim"),
+        ("import evoclaims as paper", "paper.claim.smoke"),
+    ],
+)
+def test_claims_in_a_file_that_pytest_takes_for_none_of_tests_are_a_sentence(
+    project: Any, sentence: Sentence, imported: str, mark: str
+) -> None:
     project.write("def test_other():\n    pass\n")
-    (project.path / "claims" / "more.py").write_text(
-        "from evoclaims import claim\n\n@claim('a', ...)\ndef test(): ...\n"
-    )
+    (project.path / "claims" / "more.py").write_text(f"{imported}\n\n@{mark}('a', ...)\ndef test(): ...\n")
     (project.path / "claims" / "helpers.py").write_text('"""No claim, which is made so:\n@claim(...)\n"""\n')
     result = project.run()
     assert result.ret == pytest.ExitCode.INTERRUPTED

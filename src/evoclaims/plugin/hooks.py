@@ -73,9 +73,12 @@ def _has_claim(text: bytes) -> bool:
         nodes = [*ast.walk(ast.parse(text))]
     except (SyntaxError, ValueError):  # whoever imports it learns of that
         return False
-    marks = (mark for node in nodes if isinstance(node, ast.FunctionDef) for mark in node.decorator_list)
-    names = (ast.unparse(mark.func).removeprefix("evoclaims.") for mark in marks if isinstance(mark, ast.Call))
-    return any(name in ("claim", "claim.smoke") for name in names)
+    functions = [node for node in nodes if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)]
+    marks = [mark.func for node in functions for mark in node.decorator_list if isinstance(mark, ast.Call)]
+    names = [ast.unparse(mark).removesuffix(".smoke").removesuffix(".claim") for mark in marks]
+    imported = [alias for node in nodes if isinstance(node, ast.Import | ast.ImportFrom) for alias in node.names]
+    ours = {alias.asname or alias.name for alias in imported if alias.name in ("evoclaims", "claim")}
+    return not {"claim", *ours}.isdisjoint(names)
 
 
 @pytest.hookimpl(tryfirst=True)
