@@ -28,6 +28,7 @@ HERE: dict[str, Any] = {
     "versions": {"jax": "1.0"},
     "git": {"sha": "a" * 40, "dirty": False},
 }
+ELSEWHERE = {"machine": "a slide rule"}
 LAST_PILOT = 47
 FRESH = "18 trials of each condition of better (smoke), with fresh seeds"
 
@@ -54,12 +55,13 @@ def repeat(session: Session, says: Claim) -> Repeat:
         fresh: Callable[[int], float],
         now: Session = session,
         trials: Mapping[str, Any] | None = None,
+        reference: Mapping[str, Any] = ELSEWHERE,
         **ours: Any,
     ) -> tuple[DriftReport, list[int], list[str]]:
         better = session.group("better", "small", "smoke")
         condition, asked, said = better.condition, list[int](), list[str]()
         path = references.path_of(session.reproduction.references, "smoke", "better", "small")
-        references.write(path, [_made(condition, seed, seed / 100) for seed in range(10)])
+        references.write(path, [_made(condition, seed, seed / 100, **reference) for seed in range(10)])
         claim = better.solves_every_level.in_most_trials()
         place = pilots.path_of(session.reproduction.folder, "smoke", "better", "small", second=False)
         pilot = [_made(condition, seed, seed % 10 / 100) for seed in range(20, LAST_PILOT + 1)]
@@ -139,6 +141,15 @@ def test_fresh_trials_that_cannot_be_compared_are_no_repetition(repeat: Repeat) 
     found, _, _ = repeat(_as_before, status="crashed")
     assert found.drifted
     assert "not checked: better on small (smoke): trials crashed: seeds 48, 49" in found.repetitions[0]
+
+
+def test_other_bits_than_on_the_same_machine_before_are_no_chance(repeat: Repeat) -> None:
+    found, asked, said = repeat(_as_before, reference={})
+    assert (found.drifted, asked, said) == (True, [], [])
+    assert found.repetitions[0].endswith(
+        "those of better on small (smoke) have other bits than reference trials of the same seeds, machine and "
+        "versions, and that is no chance"
+    )
 
 
 def test_trials_of_a_gpu_are_not_repeated_on_a_processor(repeat: Repeat) -> None:

@@ -16,9 +16,10 @@ from evoclaims.core.errors import UserError, in_one_line
 from evoclaims.core.packages import agree, recorded
 from evoclaims.core.provenance import same_bits
 from evoclaims.judging.drift import DriftCase, by_one_code, changed_settings, check_drift
-from evoclaims.judging.drift_report import DigestCheck, DriftReport
+from evoclaims.judging.drift_report import DigestCheck, DriftReport, compare_digests
 from evoclaims.paper import pilots, references
 from evoclaims.paper.archive import Archive
+from evoclaims.trials.failed import is_final
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition, TrialSpec
 from evoclaims.trials.store import DamagedFileError
@@ -113,13 +114,22 @@ def _case(session: Session, used: _Used, trials: Sequence[TrialResult]) -> Drift
 def _check_makes_alike(session: Session, several: Sequence[_Used]) -> None:
     """Refuse conditions whose fresh trials would be imported, or not made as their others were.
 
+    Without a change, trials have the bits of the reference trials wherever these were made on such a machine. Where
+    they do not, chance is no explanation: an edited package, say, has made them.
+
     Raises:
         UserError: which says why.
     """
     for used in several:
         if used.condition.existing:
             raise UserError(f"those of {used.label} are imported")
-        made = [trial.provenance for trial in _trials(session, used)]
+        trials = _trials(session, used)
+        if compare_digests(list(filter(is_final, trials)), _reference(session, used)).changed:
+            raise UserError(
+                f"those of {used.label} have other bits than reference trials of the same seeds, machine and versions, "
+                "and that is no chance"
+            )
+        made = [trial.provenance for trial in trials]
         if any(one.get("device", {}).get("platform") != "cpu" for one in made):
             raise UserError(f"they run on CPUs, and those of {used.label} did not")
         if any((one.get("git") or {}).get("dirty") for one in made):  # edited again, it would look the same
