@@ -141,3 +141,19 @@ def test_a_claim_that_a_conftest_takes_out_is_not_missing_without_a_word(project
     conftest.unlink()
     assert project.run("-k", "test_a").ret == 0
     assert project.run("--deselect=claims/test_claims.py::test_b").ret == 0
+
+
+@pytest.mark.parametrize("workers", [(), ("-n1",)])
+def test_a_claim_that_a_plugin_keeps_from_being_run_is_not_missing_without_a_word(
+    project: Any, sentence: Any, workers: tuple[str, ...]
+) -> None:
+    project.write(a="supported", b="refuted")
+    (project.path / "conftest.py").write_text(
+        "def pytest_runtest_protocol(item):\n    return 'test_b' in item.nodeid or None\n"
+    )
+    result = project.run(*workers)
+    assert result.ret == pytest.ExitCode.TESTS_FAILED
+    sentence(
+        result, "kept claims from being judged or reported, without a word: claims/test_claims.py::test_b[b-smoke]."
+    )
+    assert project.run("--setup-plan").ret == 0

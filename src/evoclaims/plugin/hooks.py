@@ -33,6 +33,7 @@ from evoclaims.plugin.outcomes import pytest_runtest_setup as pytest_runtest_set
 from evoclaims.plugin.progress import QUIET, ProgressLine, progress_of
 from evoclaims.plugin.start import prepare
 from evoclaims.plugin.summary import COLLECTED, COLLECTED_THERE, KNOWN, TROUBLE, Summary
+from evoclaims.plugin.untold import Untold
 from evoclaims.trials.stopping import end_without, interrupted_by, only_told
 
 if TYPE_CHECKING:
@@ -174,6 +175,7 @@ def pytest_configure(config: pytest.Config) -> None:
         "claim_without_smoke(because): no smoke test (set by smoke=None and without_smoke(...))",
     ):
         config.addinivalue_line("markers", line)
+    config.pluginmanager.register(Untold(config), "claims-untold")
     if not hasattr(config, "workerinput"):  # an xdist worker leaves the summary to its controller
         config.pluginmanager.register(Summary(config), "claims-summary")
         if config.pluginmanager.has_plugin("terminal") and config.get_verbosity() > QUIET:
