@@ -157,3 +157,16 @@ def test_a_claim_that_a_plugin_keeps_from_being_run_is_not_missing_without_a_wor
         result, "kept claims from being judged or reported, without a word: claims/test_claims.py::test_b[b-smoke]."
     )
     assert project.run("--setup-plan").ret == 0
+
+
+@pytest.mark.parametrize("before", ["", "verdict(trials('wrong', on='parity').solves_every_level.in_most_trials()); "])
+def test_a_run_that_a_test_ends_well_says_which_claims_have_no_verdict(
+    project: Any, sentence: Any, before: str
+) -> None:
+    project.write(a="supported", b=f"{before}pytest.exit('enough', returncode=0)", c="refuted")
+    result = project.run("--ff")  # in this order
+    assert result.ret == pytest.ExitCode.TESTS_FAILED
+    sentence(
+        result, "before claims had verdicts: claims/test_claims.py::test_b[b-smoke], claims/test_claims.py::test_c["
+    )
+    assert project.run("--ff", "-k", "a-smoke").ret == 0

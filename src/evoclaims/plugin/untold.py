@@ -28,7 +28,13 @@ class Untold:
     @pytest.hookimpl(wrapper=True, tryfirst=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> Generator[None, object, object]:
         """Report a claim without one; an interrupt passes, and a plan of fixtures judges nothing."""
-        result = yield
+        try:
+            result = yield
+        except pytest.exit.Exception as error:
+            claims = [one.nodeid for one in item.session.items if one.get_closest_marker("claim") is not None]
+            if error.returncode == 0 and (lost := [name for name in claims if name not in self._told]):
+                self._say(f"pytest.exit(returncode=0) has ended the run before claims had verdicts: {', '.join(lost)}.")
+            raise
         planned = any(self._config.getoption(name, False) for name in ("setuponly", "setupplan"))
         if item.get_closest_marker("claim") is not None and item.nodeid not in self._told and not planned:
             self._say(
