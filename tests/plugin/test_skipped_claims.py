@@ -157,6 +157,8 @@ def test_a_claim_that_a_plugin_keeps_from_being_run_is_not_missing_without_a_wor
         result, "kept claims from being judged or reported, without a word: claims/test_claims.py::test_b[b-smoke]."
     )
     assert project.run("--setup-plan").ret == 0
+    project.write(b="refuted")
+    assert project.run(*workers).ret == pytest.ExitCode.TESTS_FAILED  # where no claim has a verdict, too
 
 
 @pytest.mark.parametrize("before", ["", "verdict(trials('wrong', on='parity').solves_every_level.in_most_trials()); "])

@@ -95,12 +95,13 @@ class Summary:
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
         """Compare with the reference trials, write the JSON report and set the exit status.
 
-        0: nothing refuted, nothing drifted. 1: something was refuted without being accepted, broke, or drifted; or a
-        verdict changed as --claims-compare-fail names it; or, with --claims-undecided=fail, no claim was judged.
+        0: nothing refuted, nothing drifted. 1: something was refuted without being accepted, broke, drifted, or was
+        kept from being judged; or a verdict changed as --claims-compare-fail names it; or no claim was judged, with
+        --claims-undecided=fail.
         4: xdist's workers refused to begin. 5 (pytest's "no tests"): claims were selected, but no trial was judged
         (for example, all are skipped), so that nothing was measured.
         """
-        refused = bool(self._troubles)
+        refused = self._troubles and not session.testscollected
         if self.reports:  # they come in the order in which they were judged
             from evoclaims.claims.earlier_trials import drift, upgraded
             from evoclaims.verdicts import history
