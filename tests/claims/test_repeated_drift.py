@@ -13,7 +13,7 @@ from evoclaims.claims import earlier_trials
 from evoclaims.claims.claim import Claim, ClaimTest
 from evoclaims.claims.fetching import NotStoredError, RunMissing, StoredOnly
 from evoclaims.claims.session import Session
-from evoclaims.judging.drift_report import DriftReport
+from evoclaims.judging.drift_report import DriftReport, DriftRow
 from evoclaims.paper import pilots, references
 from evoclaims.paper.archive import Archive
 from evoclaims.paper.reproduction import Reproduction
@@ -106,6 +106,18 @@ def test_what_fresh_trials_do_not_show_fails_no_run(repeat: Repeat) -> None:
     assert "found would have been with probability 0.95 a shift" in sentence
     assert not found.unchecked
     assert found.nearest is None
+
+
+def test_no_other_measure_of_a_method_whose_drift_was_not_repeated_is_called_the_nearest() -> None:
+    """All its measures have the p of its joint test, by which it has drifted."""
+    shown = DriftRow("a on t (smoke)", "reward", 6, 10, "drift", 0.001, 0.002, a12=1.0, median_new=2.0, median_ref=1.0)
+    report = DriftReport((shown, replace(shown, metric="steps", status="no drift", p=0.5)), 0.01)
+    again = DriftReport((replace(shown, n_new=18, status="no drift", p=0.5, p_holm=0.5),), 0.05)
+    found = report.repeated_by(again, "a (smoke)", {shown.label})
+    assert [row.status for row in found.rows] == ["not repeated", "no drift"]
+    assert found.nearest is None
+    other = replace(shown, label="b on t (smoke)", status="no drift", p=0.3, p_holm=0.6)
+    assert replace(found, rows=(*found.rows, other)).nearest == other
 
 
 def test_what_fresh_trials_show_too_stands(repeat: Repeat) -> None:

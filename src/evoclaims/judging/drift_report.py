@@ -112,9 +112,8 @@ class DriftReport:
 
     @property
     def nearest(self) -> DriftRow | None:
-        """The tested row with the smallest p of its method, and then of its own; None without one that stands."""
-        tested = [row for row in self.rows if row.p_holm is not None and row.p is not None]
-        tested = [row for row in tested if row.status != "not repeated"]
+        """The tested row of no method that drifted with the smallest p of its method, and then of its own; or None."""
+        tested = [row for row in self.rows if row.p_holm is not None and row.p is not None and row.p_holm > self.alpha]
         return min(tested, key=lambda row: (row.p_holm, row.p), default=None)
 
     @property
