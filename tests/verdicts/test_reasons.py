@@ -60,6 +60,12 @@ def test_drift_of_other_versions_and_of_the_method_elsewhere_is_said() -> None:
     assert "but trials of the same method have drifted: a on another (smoke)" in _why(rows=(FINE, other))
 
 
+def test_a_drift_that_was_not_repeated_is_said() -> None:
+    told = _why(rows=(replace(FINE, status="not repeated", p_holm=0.002), replace(FINE, metric="steps", p_holm=0.002)))
+    assert "device H200 -> cpu); trials with fresh seeds have not shown their drift again (see above). With 10" in told
+    assert "is not known" not in told
+
+
 def test_a_change_of_what_is_computed_is_told_from_chance() -> None:
     assert _why(replace(NEW, trials="1")).startswith("from the same trials to the bit")
     drifted = replace(FINE, status="drift")

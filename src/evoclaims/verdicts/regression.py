@@ -170,6 +170,8 @@ def reason(
         }
     )
     seen = f"; {checked.undecided}" if checked.nearest else "; whether they drifted is not known"
+    if any(row.status == "not repeated" for row in mine.rows):
+        seen = "; trials with fresh seeds have not shown their drift again (see above)"
     seen += f"; but trials of the same method have drifted: {', '.join(elsewhere)}" if elsewhere else ""
     ps = f" (p was {old.p:.2g}, and is {new.p:.2g})" if old.p is not None and new.p is not None else ""
     return (
