@@ -167,11 +167,12 @@ def test_the_fixtures_are_refused_to_tests_that_are_no_claims(project: Any) -> N
 
 CHECK = "@says('a')\ndef check_a(trials, verdict):\n    pass\n"
 TWO = "@says('a')\ndef test_it(trials, verdict):\n    pass\n\n@says('b')\ndef test_it(trials, verdict):\n    pass\n"
-CLASS = """
+JUDGES = "verdict(trials('right', on='parity').solves_every_level.in_most_trials())"
+CLASS = f"""
 class Stones:
     @says("a")
     def test_a(self, trials, verdict):
-        verdict(trials("right", on="parity").solves_every_level.in_most_trials())
+        {JUDGES}
 """
 
 
@@ -219,6 +220,14 @@ def test_a_claim_that_would_not_be_collected_is_a_sentence(
     if text == CHECK:
         (project.path / "pyproject.toml").write_text(PYPROJECT + 'python_functions = "check"\n')
         assert "a" in {report["claim"] for report in project.json()["claims"]}
+
+
+@pytest.mark.parametrize(
+    "text", [f"{CLASS}    __test__ = True\n", CHECK.replace("pass", JUDGES) + "check_a.__test__ = True\n"]
+)
+def test_a_claim_is_collected_under_any_name_that_is_marked_for_pytest(project: Any, text: str) -> None:
+    project.write(text)
+    assert [report["outcome"] for report in project.json()["claims"]] == ["supported"]
 
 
 @pytest.mark.parametrize(

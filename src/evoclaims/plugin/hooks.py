@@ -100,7 +100,7 @@ def pytest_pycollect_makeitem(
         return None
     if not _is_claim(obj):
         return None
-    if not collector.funcnamefilter(name):
+    if not (collector.funcnamefilter(name) or collector.isnosetest(obj)):
         begun = " or ".join(collector.config.getini("python_functions"))
         raise collector.CollectError(
             f"{collector.nodeid}: the function {name} has @claim(...), and pytest takes none of this name for a test, "
@@ -134,7 +134,8 @@ def _why_left_out(collector: pytest.Module | pytest.Class, name: str, one: type)
     if not getattr(one, "__test__", True) or issubclass(one, unittest.TestCase):
         return ""
     lost = "so that its claim would never be judged"
-    here, is_test = one.__module__ == collector.module.__name__, collector.classnamefilter(name)
+    here = one.__module__ == collector.module.__name__
+    is_test = collector.classnamefilter(name) or collector.isnosetest(one)
     if here and not is_test and _has_claims(one) and not one.__subclasses__():
         begun = " or ".join(collector.config.getini("python_classes"))
         return f"none of this name for one of tests, {lost}: begin its name with {begun}"
