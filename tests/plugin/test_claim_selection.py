@@ -230,6 +230,12 @@ def test_a_claim_is_collected_under_any_name_that_is_marked_for_pytest(project: 
     assert [report["outcome"] for report in project.json()["claims"]] == ["supported"]
 
 
+def test_claims_that_functions_of_one_name_have_made_are_judged(project: Any) -> None:
+    make = f"def make(name):\n    @says(name)\n    def test(trials, verdict):\n        {JUDGES}\n    return test\n"
+    project.write(f"{make}\ntest_a = make('a')\n\n{make}\ntest_b = make('b')\n")
+    assert [report["claim"] for report in project.json()["claims"]] == ["a", "b"]
+
+
 @pytest.mark.parametrize(
     ("imported", "mark"),
     [

@@ -50,7 +50,8 @@ def replaced(module: ModuleType) -> str:
         for one in body:
             if isinstance(one, _NAMED) and one is not last[one.name]:
                 first = min([one.lineno, *(mark.lineno for mark in one.decorator_list)])
-                lost += [name for line, name in lines.items() if first <= line <= (one.end_lineno or first)]
+                end = one.end_lineno if isinstance(one, ast.ClassDef) else first  # what a function has made may be kept
+                lost += [name for line, name in lines.items() if first <= line <= (end or first)]
     which = f"the name of the test of {', '.join(lost)}, or of its class, is given again below"
     return f"{which}, so that it would never be judged: rename it." if lost else ""
 
