@@ -230,6 +230,15 @@ def test_a_claim_is_collected_under_any_name_that_is_marked_for_pytest(project: 
     assert [report["outcome"] for report in project.json()["claims"]] == ["supported"]
 
 
+def test_a_file_of_another_name_may_have_functions_that_make_claims(project: Any) -> None:
+    (project.path / "claims" / "making.py").write_text(
+        "from evoclaims import claim\n\ndef make(name):\n    @claim(name, says='x', where='y', smoke='z')\n"
+        f"    def test(trials, verdict):\n        {JUDGES}\n    return test\n"
+    )
+    project.write("from making import make\n\ntest_a = make('a')\n")
+    assert [report["claim"] for report in project.json()["claims"]] == ["a"]
+
+
 def test_claims_that_functions_of_one_name_have_made_are_judged(project: Any) -> None:
     make = f"def make(name):\n    @says(name)\n    def test(trials, verdict):\n        {JUDGES}\n    return test\n"
     project.write(f"{make}\ntest_a = make('a')\n\n{make}\ntest_b = make('b')\n")

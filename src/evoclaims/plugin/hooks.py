@@ -69,13 +69,18 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> None:
 
 
 def _has_claim(text: bytes) -> bool:
-    """Whether a function of a file has @claim(...) or @claim.smoke(...); a program in a string is no function of it."""
+    """Whether a function of a file has @claim(...) or @claim.smoke(...).
+
+    A program in a string is no function of it. One within another function may be made for the tests of other files.
+    """
     try:
         nodes = [*ast.walk(ast.parse(text))]
     except (SyntaxError, ValueError):  # whoever imports it learns of that
         return False
     functions = [node for node in nodes if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)]
-    marks = [mark.func for node in functions for mark in node.decorator_list if isinstance(mark, ast.Call)]
+    within = {inner for node in functions for outer in node.body for inner in ast.walk(outer)}
+    own = [node for node in functions if node not in within]
+    marks = [mark.func for node in own for mark in node.decorator_list if isinstance(mark, ast.Call)]
     names = [ast.unparse(mark).removesuffix(".smoke").removesuffix(".claim") for mark in marks]
     imported = [alias for node in nodes if isinstance(node, ast.Import | ast.ImportFrom) for alias in node.names]
     ours = {alias.asname or alias.name for alias in imported if alias.name in ("evoclaims", "claim")}
