@@ -161,6 +161,26 @@ def test_a_claim_that_a_plugin_keeps_from_being_run_is_not_missing_without_a_wor
     assert project.run(*workers).ret == pytest.ExitCode.TESTS_FAILED  # where no claim has a verdict, too
 
 
+DIED = """
+import pytest
+
+def pytest_runtest_protocol(item):
+    report = pytest.TestReport(item.nodeid, item.location, {}, "failed", "died by signal 9", "call")
+    item.ihook.pytest_runtest_logreport(report=report)
+    return True
+"""
+
+
+def test_a_claim_that_a_plugin_reports_as_failed_is_not_kept_without_a_word(project: Any) -> None:
+    """As plugins do that run each test in a process of its own, where that dies."""
+    project.write(a="supported")
+    (project.path / "conftest.py").write_text(DIED)
+    result = project.run()
+    assert result.ret == pytest.ExitCode.TESTS_FAILED
+    result.stdout.fnmatch_lines(["*died by signal 9*"])
+    result.stdout.no_fnmatch_line("*without a word*")
+
+
 @pytest.mark.parametrize("before", ["", "verdict(trials('wrong', on='parity').solves_every_level.in_most_trials()); "])
 def test_a_run_that_a_test_ends_well_says_which_claims_have_no_verdict(
     project: Any, sentence: Any, before: str

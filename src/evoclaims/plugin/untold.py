@@ -21,8 +21,8 @@ class Untold:
         self._told: set[str] = set()
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Note that a test has a claim's report."""
-        if getattr(report, ATTRIBUTE, None) is not None:
+        """Note that a test has a claim's report, or fails, as where the process died that a plugin gave to it."""
+        if getattr(report, ATTRIBUTE, None) is not None or report.failed:
             self._told.add(report.nodeid)
 
     @pytest.hookimpl(wrapper=True, tryfirst=True)
