@@ -226,6 +226,7 @@ def test_trials_that_drifted_from_the_committed_ones_fail_the_run(
             "failed: trials of right on parity (smoke) (drift)",
         ]
     )
+    project.run("-qq", "-s", own_store=True).stdout.no_fnmatch_line("*3 times as many trials*")
     none = DriftReport((DriftRow("right on parity (smoke)", "mean_success", 30, 10, "no drift"),), 0.05)
     monkeypatch.setattr("evoclaims.claims.earlier_trials.check_drift", lambda cases, alpha: none)
     result = project.run("--claims-json=verdicts.json", own_store=True)

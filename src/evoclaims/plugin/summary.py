@@ -150,9 +150,10 @@ class Summary:
         from evoclaims.claims.earlier_trials import repeated
 
         line = progress_of(self._config)
+        say = line.remark if line else lambda text: None
         try:
             with interrupted_by(signal.SIGINT):  # which is only answered while a run ends, and this may take long
-                return repeated(make_session(self._config), self.reports, found, line.remark if line else print)
+                return repeated(make_session(self._config), self.reports, found, say)
         except KeyboardInterrupt:
             return found.standing("this was interrupted; the same command goes on from there")
         finally:
