@@ -98,7 +98,7 @@ def main() -> None:
             cases = [one.again(shift, draw) for one in those]
             drifted = {row.label for row in check_drift(cases, alpha).rows if row.drifted}
             once += bool(drifted)
-            for method in {one.method for one in those if one.case.label in drifted}:
+            for method in sorted({one.method for one in those if one.case.label in drifted}):
                 several = [(one, case) for one, case in zip(those, cases, strict=True) if one.method == method]
                 again = [replace(case, new=one.fresh(TIMES * one.new, shift, draw)) for one, case in several]
                 if check_drift(again, ALPHA_REPEATED).drifted:
