@@ -139,7 +139,13 @@ def test_what_no_release_lets_compare_is_said_beside_what_stayed(
     monkeypatch.setattr(Elsewhere, "judge", judge)
     status, out, _ = evoclaims(*BISECT, "--by=bits")
     assert status == (not changes)
-    assert f"{said} (the bits of ours on parity can be compared in part or not at all).\n" in out
+    unseen = "(the bits of ours on parity can be compared in part or not at all)"
+    assert f"{said} {unseen}.\n" in out
+    if changes:
+        known = judge
+        broken = Judged("pebble 1.2", {}, {}, "it cannot be installed")
+        monkeypatch.setattr(Elsewhere, "judge", lambda self, one: broken if one.version == "1.2" else known(self, one))
+        assert f"after pebble 1.1 and not later than 1.3 {unseen}; unknown" in evoclaims(*BISECT, "--by=bits")[1]
 
 
 def test_where_nothing_changed_the_status_says_so(evoclaims: Evoclaims, outcomes: dict[str, str]) -> None:

@@ -174,7 +174,7 @@ def _tell(
     for line in across([tried[change.before], tried[change.after]]).lines:
         print(f"  {line}")
     if change.unknown:
-        print(f"{what} changed after {package} {before} and not later than {after}; unknown between them:")
+        print(f"{what} changed after {package} {before} and not later than {after}{unseen}; unknown between them:")
         for index in change.unknown:
             print(f"  {tried[index].label}: {why[index]}")
     else:
