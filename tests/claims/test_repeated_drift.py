@@ -146,7 +146,7 @@ def test_trials_made_elsewhere_or_by_other_code_are_no_repetition(repeat: Repeat
     assert sentence.startswith(
         "  it stands: there are no trials of better (smoke) with fresh seeds: those of better on"
     )
-    assert sentence.endswith("were made on another machine, with other versions, or by other code.")
+    assert sentence.endswith("were made on another machine, with other versions, or by other code")
 
 
 def test_fresh_trials_that_cannot_be_compared_are_no_repetition(repeat: Repeat) -> None:

@@ -154,7 +154,7 @@ def _fresh(session: Session, used: _Used) -> Sequence[TrialResult]:
         by_one_code(one, other) and same_bits(one.provenance, other.provenance) for one in fresh for other in trials
     )
     if not all(alike):
-        raise UserError(f"those of {used.label} were made on another machine, with other versions, or by other code.")
+        raise UserError(f"those of {used.label} were made on another machine, with other versions, or by other code")
     return fresh
 
 
