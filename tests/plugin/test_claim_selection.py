@@ -196,17 +196,20 @@ PARTIAL = "import functools\ntest_a = says('a')(functools.partial(print))\n"
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (MADE, "the class TestStones has a function with @claim(...), and pytest takes none with __init__ for one of"),
-        (DATA, "the class TestStones has a function with @claim(...), and pytest takes none with __init__ for one of"),
-        (HEIR, "the class TestStones has a function with @claim(...), and pytest takes none with __new__ for one of"),
-        (ABSTRACT, "the class TestStones has a function with @claim(...), and pytest takes no abstract class for one"),
+        (MADE, "the class TestStones has a function with @claim(...), and pytest collects no class with __init__, so"),
+        (DATA, "the class TestStones has a function with @claim(...), and pytest collects no class with __init__, so"),
+        (HEIR, "the class TestStones has a function with @claim(...), and pytest collects no class with __new__, so"),
+        (ABSTRACT, "the class TestStones has a function with @claim(...), and pytest collects no abstract class, so"),
         (AGAIN, "the name of the test of a, or of its class, is given again below, so that it would never be judged"),
         (CLASS_AGAIN, "the name of the test of a, or of its class, is given again below, so that it would never be"),
-        (LAMBDA, "which pytest takes for no test, so that it would never be judged. Write it above `def test_"),
-        (PARTIAL, "@claim('a', ...) is above functools.partial(<built-in function print>), which pytest takes for no"),
-        (CHECK, "the function check_a has @claim(...), and pytest takes none of this name for a test, so that"),
+        (
+            LAMBDA,
+            "which is no function that pytest can both mark and collect, so that it would never be judged. Write it",
+        ),
+        (PARTIAL, "@claim('a', ...) is above functools.partial(<built-in function print>), which is no function that"),
+        (CHECK, "the function check_a has @claim(...), and pytest collects no function of this name, so that"),
         (TWO, "The tests of the claims a and b have one name, test_it, so that the second replaces the first"),
-        (CLASS, "the class Stones has a function with @claim(...), and pytest takes none of this name for one of"),
+        (CLASS, "the class Stones has a function with @claim(...), and pytest collects no class of this name, so that"),
     ],
 )
 def test_a_claim_that_would_not_be_collected_is_a_sentence(
@@ -263,7 +266,7 @@ def test_claims_in_a_file_that_pytest_takes_for_none_of_tests_are_a_sentence(
     (project.path / "claims" / "helpers.py").write_text('"""No claim, which is made so:\n@claim(...)\n"""\n')
     result = project.run()
     assert result.ret == pytest.ExitCode.INTERRUPTED
-    sentence(result, "more.py has a test with @claim(...), and pytest takes no file of this name for one of tests")
+    sentence(result, "more.py has a test with @claim(...), and pytest collects no file of this name, so that")
 
 
 def test_tests_without_claims_are_left_alone(project: Any) -> None:

@@ -126,7 +126,7 @@ def test_methods_of_classes_are_paired_within_their_class(project: Any) -> None:
             WHOLE + SMALL.replace('["right",', '["right", "coin",'),
             "The smoke test test_small judges S1[coin], which its claim does not have, or marks with without_smoke.",
         ),
-        (WHOLE + SMALL.replace("test_", "check_"), "the function check_small has @claim(...), and pytest takes none"),
+        (WHOLE + SMALL.replace("test_", "check_"), "the function check_small has @claim(...), and pytest collects no"),
         (
             WHOLE + "import functools\ntest_it = functools.update_wrapper(functools.partial(test_whole), test_whole)\n"
             "del test_whole\n",

@@ -183,8 +183,8 @@ def _attached(claim_id: str, marks: list[pytest.MarkDecorator]) -> Callable[[F],
         named = inspect.unwrap(getattr(function, "__func__", function))
         if not inspect.isclass(named) and (not inspect.isfunction(named) or named.__name__ == "<lambda>"):
             raise UserError(
-                f"@claim({claim_id!r}, ...) is above {function!r}, which pytest takes for no test, so that it would "
-                "never be judged. Write it above `def test_...(trials, verdict):`."
+                f"@claim({claim_id!r}, ...) is above {function!r}, which is no function that pytest can both mark "
+                "and collect, so that it would never be judged. Write it above `def test_...(trials, verdict):`."
             )
         if (here := inspect.currentframe()) is not None and here.f_back is not None:
             _check_name(claim_id, function, here.f_back.f_locals)

@@ -49,7 +49,7 @@ _making: pytest.StashKey[bool] = pytest.StashKey()
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> None:
-    """Refuse a file in a folder of tests that has claims and whose name pytest takes for none of tests."""
+    """Refuse a file in a folder of tests that has claims and a name by which pytest does not collect it."""
     if file_path.suffix != ".py" or file_path.name == "conftest.py" or parent.session.isinitpath(file_path):
         return
     patterns: list[str] = parent.config.getini("python_files")
@@ -63,7 +63,7 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> None:
         return
     if b"evoclaims" in text and b"claim" in text and _has_claim(text):
         raise parent.CollectError(
-            f"{file_path} has a test with @claim(...), and pytest takes no file of this name for one of tests, so that "
+            f"{file_path} has a test with @claim(...), and pytest collects no file of this name, so that "
             f"its claim would never be judged: let its name be one of {' or '.join(patterns)}."
         )
 
@@ -100,7 +100,7 @@ def pytest_pycollect_makeitem(
     if inspect.isclass(obj):
         if why := _why_left_out(collector, name, obj):
             raise collector.CollectError(
-                f"{collector.nodeid}: the class {name} has a function with @claim(...), and pytest takes {why}."
+                f"{collector.nodeid}: the class {name} has a function with @claim(...), and pytest collects {why}."
             )
         return None
     if not _is_claim(obj):
@@ -108,7 +108,7 @@ def pytest_pycollect_makeitem(
     if not (collector.funcnamefilter(name) or collector.isnosetest(obj)):
         begun = " or ".join(collector.config.getini("python_functions"))
         raise collector.CollectError(
-            f"{collector.nodeid}: the function {name} has @claim(...), and pytest takes none of this name for a test, "
+            f"{collector.nodeid}: the function {name} has @claim(...), and pytest collects no function of this name, "
             f"so that its claim would never be judged: begin its name with {begun}."
         )
     if collector.stash.get(_making, False):
@@ -143,13 +143,13 @@ def _why_left_out(collector: pytest.Module | pytest.Class, name: str, one: type)
     is_test = collector.classnamefilter(name) or collector.isnosetest(one)
     if here and not is_test and _has_claims(one) and not one.__subclasses__():
         begun = " or ".join(collector.config.getini("python_classes"))
-        return f"none of this name for one of tests, {lost}: begin its name with {begun}"
+        return f"no class of this name, {lost}: begin its name with {begun}"
     if not is_test or not any(map(_has_claims, one.__mro__)):
         return ""
     if inspect.isabstract(one):
-        return "" if one.__subclasses__() else f"no abstract class for one of tests, {lost}: write an heir of it"
+        return "" if one.__subclasses__() else f"no abstract class, {lost}: write a subclass of it"
     made = [word for word in ("__init__", "__new__") if getattr(one, word) is not getattr(object, word)]
-    return f"none with {made[0]} for one of tests, {lost}: use fixtures instead" if made else ""
+    return f"no class with {made[0]}, {lost}: use fixtures instead" if made else ""
 
 
 def _has_claims(one: type) -> bool:
