@@ -189,6 +189,8 @@ import abc
 """
 AGAIN = "\n@says('a')\ndef test_a(trials, verdict):\n    pass\n\ndef test_a():\n    pass\n"
 CLASS_AGAIN = CLASS.replace("Stones", "TestStones") + "\nclass TestStones:\n    pass\n"
+MARKED = f"\n@says('a')\nclass Stones:\n    def test_a(self, trials, verdict):\n        {JUDGES}\n"
+MARKED_AGAIN = MARKED.replace("Stones", "TestStones") + "\nclass TestStones:\n    pass\n"
 LAMBDA = "test_a = says('a')(lambda trials, verdict: None)\n"
 PARTIAL = "import functools\ntest_a = says('a')(functools.partial(print))\n"
 
@@ -196,12 +198,14 @@ PARTIAL = "import functools\ntest_a = says('a')(functools.partial(print))\n"
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (MADE, "the class TestStones has a function with @claim(...), and pytest collects no class with __init__, so"),
-        (DATA, "the class TestStones has a function with @claim(...), and pytest collects no class with __init__, so"),
-        (HEIR, "the class TestStones has a function with @claim(...), and pytest collects no class with __new__, so"),
-        (ABSTRACT, "the class TestStones has a function with @claim(...), and pytest collects no abstract class, so"),
+        (MADE, "the class TestStones has @claim(...), and pytest collects no class with __init__, so"),
+        (DATA, "the class TestStones has @claim(...), and pytest collects no class with __init__, so"),
+        (HEIR, "the class TestStones has @claim(...), and pytest collects no class with __new__, so"),
+        (ABSTRACT, "the class TestStones has @claim(...), and pytest collects no abstract class, so"),
         (AGAIN, "the name of the test of a, or of its class, is given again below, so that it would never be judged"),
         (CLASS_AGAIN, "the name of the test of a, or of its class, is given again below, so that it would never be"),
+        (MARKED, "the class Stones has @claim(...), and pytest collects no class of this name, so that"),
+        (MARKED_AGAIN, "the name of the test of a, or of its class, is given again below, so that it would never be"),
         (
             LAMBDA,
             "which is no function that pytest can both mark and collect, so that it would never be judged. Write it",
@@ -209,7 +213,7 @@ PARTIAL = "import functools\ntest_a = says('a')(functools.partial(print))\n"
         (PARTIAL, "@claim('a', ...) is above functools.partial(<built-in function print>), which is no function that"),
         (CHECK, "the function check_a has @claim(...), and pytest collects no function of this name, so that"),
         (TWO, "The tests of the claims a and b have one name, test_it, so that the second replaces the first"),
-        (CLASS, "the class Stones has a function with @claim(...), and pytest collects no class of this name, so that"),
+        (CLASS, "the class Stones has @claim(...), and pytest collects no class of this name, so that"),
     ],
 )
 def test_a_claim_that_would_not_be_collected_is_a_sentence(

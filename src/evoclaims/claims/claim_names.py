@@ -42,7 +42,8 @@ def replaced(module: ModuleType) -> str:
 
     That of a later claim's test is an error of `@claim(...)` already.
     """
-    lines = {one.__code__.co_firstlineno: name for name, one in TESTS if _is_of(one, module)}
+    tests = [(name, one) for name, test in TESTS for one in (vars(test).values() if inspect.isclass(test) else (test,))]
+    lines = {one.__code__.co_firstlineno: name for name, one in tests if _is_of(one, module)}
     lost, bodies = list[str](), [ast.parse(inspect.getsource(module)).body] if lines else []
     for body in bodies:
         last = {one.name: one for one in body if isinstance(one, _NAMED)}

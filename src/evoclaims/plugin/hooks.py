@@ -100,7 +100,7 @@ def pytest_pycollect_makeitem(
     if inspect.isclass(obj):
         if why := _why_left_out(collector, name, obj):
             raise collector.CollectError(
-                f"{collector.nodeid}: the class {name} has a function with @claim(...), and pytest collects {why}."
+                f"{collector.nodeid}: the class {name} has @claim(...), and pytest collects {why}."
             )
         return None
     if not _is_claim(obj):
@@ -153,7 +153,10 @@ def _why_left_out(collector: pytest.Module | pytest.Class, name: str, one: type)
 
 
 def _has_claims(one: type) -> bool:
-    return any(map(_is_claim, vars(one).values()))
+    """Whether a class has @claim(...), or a function with it."""
+    marks = vars(one).get("pytestmark", ())
+    is_claim = isinstance(marks, list) and any(getattr(mark, "name", "") == "claim" for mark in marks)
+    return is_claim or any(map(_is_claim, vars(one).values()))
 
 
 @pytest.hookimpl(tryfirst=True)
