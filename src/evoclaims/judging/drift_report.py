@@ -96,7 +96,7 @@ class DriftReport:
 
     @property
     def lines(self) -> list[str]:
-        """A line for each row that drifted, each edited table, and each condition that could not be checked."""
+        """A line for each row that drifted, each repetition, each edited table, and each condition without a check."""
         edited = [f"EDITED {line}" for line in self.edited]
         drifted = [f"DRIFT in {row.in_words}" for row in self.rows if row.drifted]
         drifted += [f"not repeated: {row.in_words}" for row in self.rows if row.status == "not repeated"]
