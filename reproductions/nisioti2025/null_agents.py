@@ -84,8 +84,8 @@ def full_arrays(condition: Condition) -> Numbers | None:
     return {"metrics": {}, "levels": {}, "curves": sizes}
 
 
-def without_training(task: Any) -> Any:
-    """Return a task without what a policy that is not trained does not notice: sampled rows, and a goal's direction."""
+def as_examined(task: Any) -> Any:
+    """Return a task without what leaves the meaning of an agent's numbers as it is: sampled rows, and a goal shown."""
     if isinstance(task, Circuit):
         return replace(task, sampling="exhaustive")  # type: ignore[type-var]
     return replace(task, shows_goal=False) if isinstance(task, SteppingStones) else task
@@ -99,9 +99,9 @@ def _nothing_solved(success: float) -> dict[str, float]:
 NULL_AGENTS = {
     "no action": NullAgent("a robot that takes no action", no_action),
     "constant circuit": NullAgent("the best circuit that always gives the same answer", constant_circuit),
-    "random policy": NullAgent("a network with random weights", method="random_policy", meets=without_training),
+    "random policy": NullAgent("a network with random weights", method="random_policy", meets=as_examined),
     "random search": NullAgent(
-        "random search, with the evaluations of CMA-ES", method="random_search", meets=without_training
+        "random search, with the evaluations of CMA-ES", method="random_search", meets=as_examined
     ),
     "full arrays": NullAgent("a network that fills the arrays of its genome", full_arrays, everywhere=True),
 }

@@ -250,7 +250,7 @@ def test_trials_that_drifted_from_the_committed_ones_fail_the_run(
     monkeypatch.setattr("evoclaims.claims.earlier_trials.check_drift", interrupt)
     result = project.run("--claims-json=verdicts.json", own_store=True)
     assert result.ret == 1
-    assert {row["status"] for row in written} == {"drift"}  # a run that is killed now has told its verdicts
+    assert {row["status"] for row in written} == {"drift"}  # a run that is killed now has written its verdicts
     result.stdout.fnmatch_lines(["  it stands: this was interrupted; the same command goes on from there"])
     paper.write_text(before)
     for options in (("--claims-stored",), ("--claims-stored", "--claims-committed")):

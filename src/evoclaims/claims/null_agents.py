@@ -94,7 +94,7 @@ def _supported(
             return trials(source, seeds)
         if others is not None and agent.method and isinstance(source, TrialGroup):
             other = others(agent.method, source.task)
-            known = not (source.condition.existing or other.condition.existing)  # a table tells only a task's name
+            known = not (source.condition.existing or other.condition.existing)  # a table only names its task
             if known and agent.meets(other.condition.task) != agent.meets(source.condition.task):
                 raise NotStoredError("it is run on another instance of the task")
             return trials(other, design.seeds(len(seeds), bool(other.condition.existing)))

@@ -67,8 +67,8 @@ class NullAgent:
         numbers: a function from a condition to the metrics, levels and curves of the agent's trials, or to None if the
             agent cannot stand for it.
         method: a method of the same tier whose committed trials on the same task are its trials.
-        meets: returns a task without what makes no difference to that method's trials; where two of one name still
-            differ, as methods may have instances of their own, the agent does not stand for the condition.
+        meets: returns a task without differences by which the agent's numbers mean the same. Tasks of one name may
+            differ otherwise, by their rewards, say: then the agent does not stand for the condition.
         everywhere: True if it only stands for all conditions of an assertion at once; False if it also stands for the
             claimed ones alone, beside the trials of the others (see `claims.null_agents`).
 
