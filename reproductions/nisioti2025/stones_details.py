@@ -90,6 +90,18 @@ def one_start_map(method: str, task: str, condition: Condition) -> Condition | N
     return replace(condition, method=as_kind(OneStartMapElites, condition.method))
 
 
+LONG_MAP: Final = 50_000
+"""Iterations of MAP-Elites under `long_map`: fifty times the protocol's, half of the table's loops times iterations."""
+
+
+def long_map(method: str, task: str, condition: Condition) -> Condition | None:
+    """MAP-Elites at full size, trained fifty times as long."""
+    ours = ecorobot.FULL.get((method, task))
+    if ours is None or not isinstance(condition.method, MapElites) or condition.budget != ours.budget:
+        return None
+    return replace(condition, budget=_generations(LONG_MAP))
+
+
 def best_ever(method: str, task: str, condition: Condition) -> Condition | None:
     """NEAT, HyperNEAT and CMA-ES with robots, with the champion of the best training episode of all generations."""
     for kind, other in ((Neat, BestEverNeat), (HyperNeat, BestEverHyperNeat)):
