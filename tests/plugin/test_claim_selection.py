@@ -273,6 +273,16 @@ def test_claims_in_a_file_that_pytest_takes_for_none_of_tests_are_a_sentence(
     sentence(result, "more.py has a test with @claim(...), and pytest collects no file of this name, so that")
 
 
+def test_a_claim_in_a_conftest_is_a_sentence(project: Any, sentence: Sentence) -> None:
+    project.write("def test_other():\n    pass\n")
+    (project.path / "claims" / "conftest.py").write_text(
+        "import evoclaims\n\n@evoclaims.claim('A', says='a', where='b')\ndef test(): ...\n"
+    )
+    result = project.run()
+    assert result.ret == pytest.ExitCode.INTERRUPTED
+    sentence(result, "conftest.py has a test with @claim(...), and pytest collects no file of this name, so that")
+
+
 def test_tests_without_claims_are_left_alone(project: Any) -> None:
     project.write("def test_a():\n    pass\n")
     result = project.run(own_store=True)

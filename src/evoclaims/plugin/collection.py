@@ -25,7 +25,7 @@ _making: pytest.StashKey[bool] = pytest.StashKey()
 @pytest.hookimpl(tryfirst=True)
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> None:
     """Refuse a file in a folder of tests that has claims and a name by which pytest does not collect it."""
-    if file_path.suffix != ".py" or file_path.name == "conftest.py" or parent.session.isinitpath(file_path):
+    if file_path.suffix != ".py" or parent.session.isinitpath(file_path):
         return
     patterns: list[str] = parent.config.getini("python_files")
     if any(fnmatch(file_path.name if os.sep not in one else str(file_path), one) for one in patterns):
@@ -39,7 +39,7 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> None:
     if b"evoclaims" in text and b"claim" in text and _has_claim(text):
         raise parent.CollectError(
             f"{file_path} has a test with @claim(...), and pytest collects no file of this name, so that "
-            f"its claim would never be judged: let its name be one of {' or '.join(patterns)}."
+            f"its claim would never be judged: put it into a file whose name is one of {' or '.join(patterns)}."
         )
 
 
