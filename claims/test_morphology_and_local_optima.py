@@ -160,7 +160,7 @@ def test_the_ant_does_not_escape(trials, verdict):
     read="HyperNEAT never, MAP-Elites in most trials",
     since=FIRST,
 )
-@expected(Outcome.REFUTED, because="HyperNEAT fails, but MAP-Elites, too, has found the target in few trials (see S7)")
+@expected(Outcome.REFUTED, because="HyperNEAT fails, but MAP-Elites finds the target in few trials, too (see S7)")
 def test_hyperneat_fails_in_the_difficult_maze(trials, verdict):
     hyperneat = trials("hyperneat", on="deceptive_maze_difficult")
     map_elites = trials("map_elites", on="deceptive_maze_difficult")

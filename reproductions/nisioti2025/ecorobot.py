@@ -1,7 +1,7 @@
 """Figs. 5 to 10: conditions on ecorobot, at the paper's size ("full") and scaled down ("smoke").
 
-Hyperparameters are from the paper's tables (appendix A), MAP-Elites' training length too. Those of the others, which it
-omits, are from the published code.
+Hyperparameters are from the paper's tables (appendix A), MAP-Elites' training length too, as docs/protocol.md reads it.
+Those of the others, which it omits, are from the published code.
 """
 
 from __future__ import annotations

@@ -122,7 +122,7 @@ FIGURE = Figure(
         remarks=(
             "Ours are read from the conditions on N-parity and on the maze with stepping stones.",
             "The paper's batch size of PPO, 20,498, is a misprint of 2,048, the published code's.",
-            "The paper's loops of MAP-Elites are the reports that training is cut into.",
+            "The paper's loops of MAP-Elites are read as the reports that training is cut into (docs/protocol.md).",
         ),
     ),
 )
