@@ -146,28 +146,6 @@ class _Unseeing(Rangefinders):
         return jnp.ones(self.count)
 
 
-class UnseeingRays(Fault):
-    """A maze in which the robot's rays meet nothing."""
-
-    says: ClassVar[str] = "has rays that see nothing"
-
-    @property
-    def sensor(self) -> Rangefinders:
-        """As many rays as those of the sound maze."""
-        return _Unseeing(self.sound.sensor.count, self.sound.sensor.reach)
-
-
-class TurnedRays(Fault):
-    """A room in which the robot's rays come from left to right."""
-
-    says: ClassVar[str] = "has rays from left to right"
-
-    @property
-    def sensor(self) -> Rangefinders:
-        """The rays in the other order."""
-        return _Turned(self.sound.sensor.count, self.sound.sensor.reach)
-
-
 @dataclass(frozen=True)
 class _Turned(Rangefinders):
     """Rays in the other order."""
@@ -175,6 +153,11 @@ class _Turned(Rangefinders):
     def read(self, scene: Any, pose: Any) -> Any:
         """Return the sound readings from the last to the first."""
         return super().read(scene, pose)[::-1]
+
+
+def _with_rays(says: str, kind: type[Rangefinders], only: type | tuple[type, ...]) -> Mutant:
+    """Return the mutant whose robot has other rays, as many and as long as the sound one's."""
+    return with_task(says, lambda task: replace(task, sensor=kind(task.sensor.count, task.sensor.reach)), only)
 
 
 class DropsAFrame(Fault):
@@ -368,8 +351,8 @@ MUTANTS = {
         "counts stones from 1 m away", lambda task: replace(task, within=1.0), only=SteppingStones
     ),
     "no-walls": of_task(WallsUnderground, only=MAZES),
-    "unseeing-rays": of_task(UnseeingRays, only=(*MAZES, Room)),
-    "turned-rays": of_task(TurnedRays, only=Room),
+    "unseeing-rays": _with_rays("has rays that see nothing", _Unseeing, only=(*MAZES, Room)),
+    "turned-rays": _with_rays("has rays from left to right", _Turned, only=Room),
     "drops-a-frame": of_task(DropsAFrame, only=Room),
     "selects-anybody": _with_species("lets anybody have offspring", survival=1.0),
     "one-parent": _with_species("has one parent in each species", survival=0.01),

@@ -149,3 +149,16 @@ def test_stored_trials_alone_are_judged_if_asked_for(evoclaims: Evoclaims, proje
     assert (status, err.count("\n")) == (2, 1)
     assert "No claim of the smoke tier is judged yet" in err
     assert not Path("mutants.toml").exists()
+
+
+def test_a_claim_that_a_fault_makes_an_error_is_told(evoclaims: Evoclaims, stored: Store, project: Project) -> None:
+    """The matrix calls the fault broken, as where its trials crashed: nobody would look for an error in the claim."""
+    project.write(
+        a="right = trials('right', on='parity')\n"
+        "    assert right.condition.task.name == 'n_parity', 'another task'\n"
+        "    verdict(right.solves_every_level.in_most_trials())"
+    )
+    status, _, err = evoclaims("mutants", "--mutant=blind")
+    assert (status, err.count("\n")) == (0, 1)
+    assert err.startswith("evoclaims: parity: blind: a cannot be judged: AssertionError: another task")
+    assert load(Path("mutants.toml"))["smoke", "a"].named(Fate.BROKEN) == (BLIND,)

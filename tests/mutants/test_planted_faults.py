@@ -96,6 +96,19 @@ def test_equal_faulty_components_are_equal_and_differ_from_sound_ones() -> None:
     assert (blind.name, PARITY.name) == ("n_parity that shows nothing", "n_parity")
 
 
+class _TwoBits(faults.Fault):
+    """Parity of two bits, however many were asked for."""
+
+    says = "has two bits"
+    bits = 2
+
+
+def test_a_fault_in_place_of_a_parameter_is_one_sentence() -> None:
+    """A copy of the component with another parameter could not be made."""
+    with pytest.raises(UserError, match="_TwoBits replaces 'bits', a parameter of 'n_parity'"):
+        plant(_TwoBits, PARITY)
+
+
 def test_two_faults_in_one_component_are_one_sentence() -> None:
     with pytest.raises(UserError, match="'n_parity that shows nothing' has a fault already"):
         plant(faults.Paralysed, plant(faults.Blind, PARITY))
@@ -181,13 +194,6 @@ def test_a_forgotten_champion_is_what_training_began_with() -> None:
     assert (CMA_ES.best(PARITY, state).parameters != 0).any()
 
 
-def test_one_seed_gives_the_same_trial_whatever_the_seed() -> None:
-    method: Any = plant(faults.HasOneSeed, CMA_ES)
-    finals = [method.best(PARITY, trained(method, seed=seed)[0]).parameters for seed in (0, 1)]
-    np.testing.assert_array_equal(*finals)
-    assert (trained(CMA_ES, seed=0)[0].champion.parameters != trained(CMA_ES, seed=1)[0].champion.parameters).any()
-
-
 def test_the_step_size_stays_what_it_was() -> None:
     method: Any = plant(faults.KeepsItsStepSize, CMA_ES)
     assert float(trained(method)[0].distribution.std) == float(method.init(KEY, PARITY).distribution.std)
@@ -208,11 +214,11 @@ def test_the_engine_runs_a_mutant_as_any_other_condition(name: str) -> None:
     assert jax.eval_shape(whole, jnp.int32(0)).shape == (PARITY.levels,)
 
 
-@pytest.mark.parametrize("fault", [None, faults.HasOneSeed, faults.ForgetsChampion])
+@pytest.mark.parametrize("fault", [None, faults.ForgetsChampion])
 def test_a_fault_in_neat_is_traced_side_by_side_too(fault: type[Any] | None) -> None:
     sound = Neat(Settings(population=8, nodes=8, connections=12, species=Species(most=3)))
     method = plant(fault, sound) if fault else sound
-    assert isinstance(method, Resizable) is (fault is not faults.HasOneSeed)
+    assert isinstance(method, Resizable)
     program, two = Program(condition(method)), jnp.arange(2)
     state = jax.eval_shape(jax.vmap(program.start), two, two > 2)
     following, _ = jax.eval_shape(program.advance_together, state, two)

@@ -12,7 +12,6 @@ from evoclaims.core.errors import UserError
 from evoclaims.judging.verdict import Outcome
 from evoclaims.verdicts.claim_report import Tried
 from evoclaims.verdicts.mutation_matrix import (
-    COPIES,
     Attempt,
     Fate,
     Matrix,
@@ -72,8 +71,6 @@ BLIND = attempt("blind", Fate.KILLED, "maze", "task")
         (row(BLIND, untried=("neat: a",)), Tried.NOT_TRIED),
         (row(a=Fate.SURVIVED, untried=("neat: b",)), Tried.NOT_TRIED),
         (row(a=Fate.KILLED, untried=("neat: b",)), Tried.SENSITIVE),
-        (row(attempt(COPIES, Fate.KILLED), a=Fate.SURVIVED), Tried.INSENSITIVE),  # copies end any claim
-        (row(attempt(COPIES, Fate.KILLED)), Tried.NOT_TRIED),
     ],
 )
 def test_a_claim_is_insensitive_when_no_fault_of_its_methods_changes_it(one: Sensitivity, found: Tried) -> None:
@@ -82,8 +79,7 @@ def test_a_claim_is_insensitive_when_no_fault_of_its_methods_changes_it(one: Sen
 
 def test_a_method_is_unnoticed_when_none_of_its_own_mutants_has_changed_the_verdict() -> None:
     own = attempt("minimizes", Fate.KILLED), attempt("minimizes", Fate.SURVIVED, "ppo")
-    attempts = *own, attempt(COPIES, Fate.KILLED, "ppo"), BLIND
-    assert Sensitivity(SUPPORTED, "", ("neat", "ppo", "cma_es"), attempts).unnoticed == ("ppo", "cma_es")
+    assert Sensitivity(SUPPORTED, "", ("neat", "ppo", "cma_es"), (*own, BLIND)).unnoticed == ("ppo", "cma_es")
 
 
 NOT_TRIED = "Planted faults: not tried."
@@ -105,8 +101,7 @@ def test_a_row_is_about_a_verdict_of_the_same_conditions_rules_and_outcome_and_n
     ):
         assert tried(matrix, other) is Tried.NOT_TRIED
         assert described(matrix, other) == NOT_TRIED
-    noticed = row(attempt(COPIES, Fate.KILLED), a=Fate.KILLED)
-    assert described({("smoke", "A"): noticed}, judged) == "Planted faults: 1 of 1 change this verdict."
+    assert described({("smoke", "A"): row(a=Fate.KILLED)}, judged) == "Planted faults: 1 of 1 change this verdict."
     assert described({("smoke", "A"): row(untried=("a",))}, judged) == NOT_TRIED
 
 

@@ -15,11 +15,12 @@ from evoclaims.core.errors import UnknownNameError, UserError
 from evoclaims.core.files import write_atomically
 from evoclaims.execution.job import Job, jobs
 from evoclaims.execution.worker import Ended, WorkOrder
+from evoclaims.judging.verdict import Outcome
 from evoclaims.mutants.mutant import Planted, load, plantings
 from evoclaims.mutants.trying import Comparison, merged, noticed, under_faults
 from evoclaims.trials.spec import Condition
 from evoclaims.verdicts import mutation_matrix
-from evoclaims.verdicts.claim_report import Tried
+from evoclaims.verdicts.claim_report import ClaimReport, Tried
 from evoclaims.verdicts.history import key_of
 from evoclaims.verdicts.mutation_matrix import Fate, Sensitivity, score
 from evoclaims.verdicts.other_code import edits
@@ -69,7 +70,7 @@ def main(options: argparse.Namespace) -> int:
     for (on, claim), row in sorted(matrix.items()):
         if on == options.tier:
             print("\n".join(_told(claim, row)))
-    for line in edits([report for several in reports for report in several]):
+    for line in (*_errors(claims, planted, reports), *edits([report for several in reports for report in several])):
         print(f"evoclaims: {line}", file=sys.stderr)
     print(f"{score(matrix, options.tier)}\nwrote {path}: look at the changes and commit them")
     return int(bool(failed))
@@ -111,6 +112,20 @@ def _run(project: Project, wanted: Mapping[Job, Condition], options: argparse.Na
             file=sys.stderr,
         )
     return failed
+
+
+def _errors(
+    sound: Sequence[ClaimReport], planted: Sequence[Planted], faulty: Sequence[Sequence[ClaimReport]]
+) -> Iterator[str]:
+    """Yield a line on each fault whose trials ended, but made claims an error: the matrix calls it broken."""
+    judged = {key_of(report) for report in sound if report.outcome.judged}
+    for one, several in zip(planted, faulty, strict=True):
+        reasons: dict[str, list[str]] = {}
+        for report in several:
+            if report.outcome is Outcome.ERROR and key_of(report) in judged:
+                reasons.setdefault(report.reason, []).append(key_of(report)[1])
+        for reason, names in reasons.items():
+            yield f"{one.name}: {', '.join(names)} cannot be judged: {reason}"
 
 
 def _told(claim: str, row: Sensitivity) -> Iterator[str]:

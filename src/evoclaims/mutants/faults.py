@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import cache
 from typing import Any, ClassVar, TypeVar
 
@@ -54,10 +54,17 @@ def plant(fault: type[F], component: Any) -> F:
     """Return a component with the same parameters and the fault.
 
     Raises:
-        UserError: when there is a fault in it already: a combination of two has no clear meaning.
+        UserError: when there is a fault in it already: a combination of two has no clear meaning. Or when the fault
+            replaces a parameter: no copy of the component with another parameter could be made.
     """
     if isinstance(component, Fault):
         raise UserError(f"{component.name!r} has a fault already. Plant each fault in a component without one.")
+    replaced = sorted({field.name for field in fields(component)} & (set(dir(fault)) - set(dir(Fault))))
+    if replaced:
+        raise UserError(
+            f"{fault.__name__} replaces {replaced[0]!r}, a parameter of {component.name!r}. Change parameters with "
+            "`with_method` or `with_task` instead."
+        )
     kinds: Any = fault, type(component)
     made: F = object.__new__(_faulty(*kinds))
     made.__dict__.update(component.__dict__)
@@ -244,31 +251,6 @@ class ForgetsChampion(Fault):
     def best(self, task: Task, state: Any) -> Policy:
         """Return the policy of an untrained state."""
         policy: Policy = self.sound.best(task, self.sound.init(jax.random.key(0), task))
-        return policy
-
-
-class HasOneSeed(Fault):
-    """All trials draw the same random numbers, whatever their seeds."""
-
-    says: ClassVar[str] = "has one seed"
-
-    sizes = size_for = in_size = None  # the state is another one: see `Resizable`
-
-    def init(self, key: PRNGKeyArray, task: Task) -> tuple[Int[Array, ""], Any]:
-        """Start from a fixed key, and count steps from now on."""
-        return jnp.zeros((), jnp.int32), self.sound.init(jax.random.key(0), task)
-
-    def step(
-        self, key: PRNGKeyArray, task: Task, level: Int[Array, ""], state: tuple[Int[Array, ""], Any]
-    ) -> tuple[tuple[Int[Array, ""], Any], Progress]:
-        """Take a step with a key that depends only on its number."""
-        number, inner = state
-        inner, progress = self.sound.step(jax.random.fold_in(jax.random.key(1), number), task, level, inner)
-        return (number + 1, inner), progress
-
-    def best(self, task: Task, state: tuple[Int[Array, ""], Any]) -> Policy:
-        """Return the policy of the sound method's state."""
-        policy: Policy = self.sound.best(task, state[1])
         return policy
 
 

@@ -17,7 +17,7 @@ from evoclaims.paper.config import import_module
 from evoclaims.paper.reproduction import Conditions, Names, Reproduction
 from evoclaims.trials.spec import Condition
 from evoclaims.verdicts.claim_report import ClaimReport
-from evoclaims.verdicts.mutation_matrix import COPIES, Part
+from evoclaims.verdicts.mutation_matrix import Part
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,6 @@ MUTANTS: Final[Mapping[str, Mutant]] = {
     "minimizes": of_method(faults.Minimizes),
     "selects-at-random": of_method(faults.SelectsAtRandom),
     "forgets-champion": of_method(faults.ForgetsChampion),
-    COPIES: of_method(faults.HasOneSeed),
     "fixed-step-size": of_method(faults.KeepsItsStepSize, CmaEs),
     "random-archive": with_method("varies no elite", lambda method: replace(method, initial=2**30), MapElites),
     "blind": of_task(faults.Blind),

@@ -23,9 +23,6 @@ from evoclaims.verdicts.history import key_of
 FILE: Final = "mutants.toml"
 SCHEMA: Final = 1
 
-COPIES: Final = "one-seed"
-"""The fault that makes all trials copies. The judge refuses them in any claim, so this fault tests none."""
-
 Part = Literal["method", "task"]
 """What has a fault."""
 
@@ -84,11 +81,6 @@ class Attempt:
         """A name such as "cma_es: minimizes"."""
         return f"{self.target}: {self.mutant}"
 
-    @property
-    def counts(self) -> bool:
-        """Whether its fate says something about the claim."""
-        return self.fate.counts and self.mutant != COPIES
-
 
 @dataclass(frozen=True)
 class Sensitivity:
@@ -119,7 +111,7 @@ class Sensitivity:
         Where no fault of its methods can be noticed, since they never learn, those of its tasks count instead. While
         some mutants are untried, only a change by a fault of its methods says something.
         """
-        counted = [attempt for attempt in self.attempts if attempt.counts]
+        counted = [attempt for attempt in self.attempts if attempt.fate.counts]
         considered = [attempt for attempt in counted if attempt.part == "method"]
         if not self.untried:
             considered = considered or counted
@@ -130,7 +122,7 @@ class Sensitivity:
     @property
     def unnoticed(self) -> tuple[str, ...]:
         """The methods that the claim names, and none of whose own faults changes its verdict."""
-        own = (one for one in self.attempts if one.part == "method" and one.counts)
+        own = (one for one in self.attempts if one.part == "method" and one.fate.counts)
         noticed = {one.target for one in own if one.fate is Fate.KILLED}
         return tuple(method for method in self.methods if method not in noticed)
 
@@ -156,7 +148,7 @@ def described(matrix: Matrix, report: ClaimReport) -> str:
     row = current(matrix, report)
     if row is None or row.tried is Tried.NOT_TRIED:
         return "Planted faults: not tried."
-    fates = [attempt.fate for attempt in row.attempts if attempt.counts]
+    fates = [attempt.fate for attempt in row.attempts if attempt.fate.counts]
     text = f"Planted faults: {fates.count(Fate.KILLED)} of {len(fates)} change this verdict"
     if row.unnoticed:
         text += f", none of those in {' or '.join(row.unnoticed)}"
