@@ -137,10 +137,13 @@ class Session:
     def _with_null_agents(self, report: ClaimReport, assertion: Assertion, design: Design) -> ClaimReport:
         """Add the null agents that satisfy a claim of the paper; controls and mechanisms are put to none.
 
-        Only trials that were looked at are asked for again, so that nothing runs for it.
+        Only trials that were looked at are asked for again, so that nothing runs for it. Of a variant's verdicts
+        tables tell which are vacuous, and nothing else: so only supported ones are put to agents.
         """
         agents = self.reproduction.null_agents
         if not agents or not report.n or report.is_control or isinstance(self.fetch, AsPublished):
+            return report
+        if self.variant and report.outcome is not Outcome.SUPPORTED:
             return report
         look = Look(report.n, design.alpha)
         if self.only_reads and assertion.attainable(look.n, design).supported > look.alpha:
