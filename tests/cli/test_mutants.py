@@ -162,3 +162,23 @@ def test_a_claim_that_a_fault_makes_an_error_is_told(evoclaims: Evoclaims, store
     assert (status, err.count("\n")) == (0, 1)
     assert err.startswith("evoclaims: parity: blind: a cannot be judged: AssertionError: another task")
     assert load(Path("mutants.toml"))["smoke", "a"].named(Fate.BROKEN) == (BLIND,)
+
+
+def test_faulty_trials_of_other_versions_than_the_sound_ones_are_not_compared(
+    evoclaims: Evoclaims, stored: Store
+) -> None:
+    """Sound trials may be committed ones of here where the store comes from another machine."""
+    sound = set(stored.ids())
+    assert evoclaims("mutants", "--mutant=blind")[0] == 0
+    before = Path("mutants.toml").read_bytes()
+    faulty = [trial for trial in stored.results([]) if trial.id not in sound]
+    forget(stored, faulty)
+    for trial in faulty:
+        versions = {**trial.provenance["versions"], "jax": "0.4.1"}
+        stored.put(replace(trial, provenance={**trial.provenance, "versions": versions}), {})
+    status, _, err = evoclaims("mutants", "--stored", "--mutant=blind")
+    assert (status, err.count("\n")) == (2, 1)
+    assert re.search(
+        r"with the fault 'blind' were made with other versions than those without it \(jax .* -> 0\.4\.1\)", err
+    )
+    assert Path("mutants.toml").read_bytes() == before

@@ -55,9 +55,10 @@ def main(options: argparse.Namespace) -> int:
             f"Judge them with `pytest -m {options.tier}{project.store.pytest_option}`, or run what is missing with "
             f"`evoclaims mutants{project.store.option}` without --stored."
         )
+    comparison = Comparison(project.archive, project.reproduction, options.tier, frozenset(used))
+    comparison.check(planted)
     mutated = replace(project, reproduction=under_faults(project.reproduction, options.tier, planted))
     reports = mutated.judge_variants([(options.tier, one.name) for one in planted])
-    comparison = Comparison(project.archive, project.reproduction, options.tier, frozenset(used))
     broken = {(one.job.fault, one.job.names) for one in failed if not one.untried}
     path = project.reproduction.folder / mutation_matrix.FILE
     matrix = merged(

@@ -6,6 +6,8 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
+from evoclaims.core.errors import UserError
+from evoclaims.core.packages import recorded
 from evoclaims.judging.drift import ALPHA, DriftCase, check_drift
 from evoclaims.judging.verdict import Outcome
 from evoclaims.mutants.mutant import Planted
@@ -17,6 +19,7 @@ from evoclaims.trials.spec import Condition
 from evoclaims.verdicts.claim_report import ClaimReport
 from evoclaims.verdicts.history import key_of
 from evoclaims.verdicts.mutation_matrix import Attempt, Fate, Matrix, Sensitivity, fate
+from evoclaims.verdicts.source_trials import change
 
 
 def under_faults(reproduction: Reproduction, tier: str, planted: Sequence[Planted]) -> Reproduction:
@@ -39,6 +42,23 @@ class Comparison:
     reproduction: Reproduction
     tier: str
     used: frozenset[Names]
+
+    def check(self, planted: Sequence[Planted]) -> None:
+        """Check that faulty trials were made with the versions of the sound ones, else both are told apart by these.
+
+        Raises:
+            UserError: when some were not, as where a store comes from elsewhere.
+        """
+        for one in planted:
+            for names, condition in one.conditions.items():
+                pair = [self._trials(each)[0] for each in (self._sound(names), condition)]
+                made = [recorded(trial.provenance, condition.packages) for trial in pair if trial is not None]
+                if len(made) == 2 and (moved := change(*made)):
+                    raise UserError(
+                        f"Trials of {' on '.join(names)} with the fault {one.mutant!r} were made with other versions "
+                        f"than those without it ({moved}), so that no difference would show what the fault does. Judge "
+                        "such a store where its versions are installed."
+                    )
 
     def equivalent(self, names: Names, faulty: Condition, curves: Collection[str]) -> bool:
         """Whether every faulty trial ends as the sound one of its seed, and has the same of the `curves` that count."""
