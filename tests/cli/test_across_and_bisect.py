@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 import unpacked
-from hand_made_verdicts import report
+from hand_made_verdicts import report, verdict
 from made_trials import trial_of
 from tiny_project import Evoclaims, Project
 
@@ -42,6 +42,9 @@ def outcomes(monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
         outcome = known[recipe.version]
         if outcome == "gone":
             return Judged(recipe.label, {"other": report("other")}, {})
+        if outcome == "late":
+            late = verdict("inconclusive", without_result="1 of 10 trials ran out of time")
+            return Judged(recipe.label, {"a": report("a", "inconclusive", verdict=late)}, {})
         if outcome not in list(Outcome):
             return Judged(recipe.label, {}, {}, trouble=outcome)
         return Judged(recipe.label, {"a": report("a", outcome)}, {})
@@ -64,7 +67,7 @@ def test_the_release_is_found_by_a_handful_of_environments(evoclaims: Evoclaims,
     assert outcomes["asked"] == "1.0 1.8 1.4 1.2 1.3 "
 
 
-@pytest.mark.parametrize("instead", ["it cannot be installed", "error"])
+@pytest.mark.parametrize("instead", ["it cannot be installed", "error", "late"])
 def test_a_release_that_cannot_be_judged_is_gone_round_and_told(
     evoclaims: Evoclaims, outcomes: dict[str, str], instead: str
 ) -> None:
@@ -73,7 +76,7 @@ def test_a_release_that_cannot_be_judged_is_gone_round_and_told(
     status, out, _ = evoclaims(*BISECT)
     assert status == 0
     assert "changed after pebble 1.3 and not later than 1.5; unknown between them:\n  pebble 1.4: " in out
-    assert ("it cannot be installed" in out) == (instead != "error")
+    assert ("it cannot be installed" in out) == (instead not in ("error", "late"))
 
 
 def test_a_claim_that_is_gone_has_changed_and_a_release_without_it_alone_says_nothing(

@@ -143,6 +143,14 @@ def test_only_what_is_missing_is_submitted(evoclaims: Evoclaims, slurm: StandIn)
     assert "2 batches of the smoke tier in 2 jobs" in evoclaims("submit", "--on=parity")[1]  # neither right nor wrong
 
 
+def test_the_words_of_a_site_between_squeues_lines_are_skipped(evoclaims: Evoclaims, slurm: StandIn) -> None:
+    assert evoclaims("submit", "right", "--on=parity")[0] == 0
+    slurm.queue.write_text("Maintenance on Monday | 8 o'clock\n41|PENDING|Priority|\n")
+    status, out, _ = evoclaims("jobs")
+    assert status == 0
+    assert out.startswith("queued   41  right on parity, smoke: Priority\n")
+
+
 @pytest.mark.usefixtures("stored")
 def test_more_trials_than_the_tiers_are_submitted_and_looked_for(evoclaims: Evoclaims, slurm: StandIn) -> None:
     """Those of a third look, for example."""
@@ -152,6 +160,18 @@ def test_more_trials_than_the_tiers_are_submitted_and_looked_for(evoclaims: Evoc
     assert submission.trials == 12
     assert evoclaims("jobs")[1].splitlines()[-2] == "1 failed"  # two are missing
     assert "--trials takes 1 to 100 trials" in evoclaims("submit", "right", "--trials=101")[2]
+
+
+@pytest.mark.usefixtures("stored")
+def test_a_job_runs_the_seeds_of_the_design(evoclaims: Evoclaims, slurm: StandIn) -> None:
+    paper = Path("tiny_paper.py")
+    design = "Design(looks=Design.fixed(10).looks, first_seed=500)"
+    paper.write_text(paper.read_text(encoding="utf-8").replace("Design.fixed(10)", design, 1), encoding="utf-8")
+    sys.modules.pop("tiny_paper", None)
+    assert evoclaims("run", "right", "--on=parity")[0] == 0
+    assert "no batch of the smoke tier is missing" in evoclaims("submit", "right", "--on=parity")[1]
+    seeds = {trial.seed for trial in trials_of(Store(Path(".evoclaims")), "hand_built")}
+    assert seeds == {*range(10), *range(500, 510)}
 
 
 @pytest.mark.usefixtures("stored")

@@ -93,6 +93,18 @@ def test_the_command_ends_with_its_trials_timed_out(project: Project) -> None:
         )
 
 
+def test_a_command_that_collects_claims_goes_on_after_trials_that_never_return(project: Project) -> None:
+    """A run of pytest would end the process, since they still run in it."""
+    _stuck(project, "{**METHODS, 'calling': Calling()}")
+    project.write(slow="verdict(trials('calling', on='parity').solves_every_level.in_most_trials())", a="supported")
+    settings = project.path / "pyproject.toml"
+    settings.write_text(settings.read_text().replace("[tool.evoclaims]", f'[tool.evoclaims]\ntime_limit = "{LIMIT}"'))
+    done = _evoclaims(project, "mutants", "--mutant=blind", "--device=cpu")
+    assert "planted faults change a verdict" in done.stdout
+    assert "slow cannot be judged: " in done.stderr
+    assert (project.path / "mutants.toml").exists()
+
+
 def test_a_run_goes_on_to_the_other_claims_and_says_whose_time_was_over(project: Project, stored: Store) -> None:
     """The trials of the right network are stored: it must not be short of time."""
     _stuck(project, "{**METHODS, 'looping': Looping()}")

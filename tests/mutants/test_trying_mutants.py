@@ -34,13 +34,13 @@ def judged(outcome: str = "supported", *, task: str = "maze") -> ClaimReport:
 
 
 class _Compared:
-    """Stands for a comparison of trials: none is equivalent, none has drifted."""
+    """Stands for a comparison of trials: none is equivalent, and only what reads stones has drifted."""
 
     def equivalent(self, names: Any, faulty: Condition, curves: Any) -> bool:
         return False
 
-    def drifted(self, names: Any, faulty: Condition) -> bool:
-        return False
+    def drifted(self, names: Any, faulty: Condition, reads: Any) -> bool:
+        return "metrics.stones" in reads
 
 
 class _SameEnds(_Compared):
@@ -74,9 +74,28 @@ def test_a_condition_that_has_just_failed_is_broken_and_one_that_was_not_run_is_
     assert row.attempts == ()
 
 
+def test_trials_out_of_time_are_broken_and_kill_nothing() -> None:
+    """Nothing is known of their results, and a fault may well make trials slower."""
+    late = judged("inconclusive")
+    assert late.verdict is not None
+    late = replace(late, verdict=replace(late.verdict, without_result="3 of 10 trials of neat ran out of time"))
+    for faulty, fate in ((late, Fate.BROKEN), (judged("inconclusive"), Fate.KILLED)):
+        row = tried(BLIND, judged(), faulty)
+        assert row is not None
+        assert row.named(fate) == ("maze: blind",)
+
+
+def test_drift_is_asked_of_what_any_claim_reads_of_the_condition() -> None:
+    """As in a run of pytest, which tests it together for all claims."""
+    other = judged()
+    other = replace(other, claim="B", sources=tuple(replace(one, reads=("metrics.stones",)) for one in other.sources))
+    rows = noticed(cast(Comparison, _Compared()), [judged(), other], [BLIND], [[judged(), other]], ())
+    assert rows["smoke", "A"].named(Fate.DRIFTED) == ("maze: blind",)
+
+
 def test_trials_that_differ_in_a_curve_are_not_equivalent_for_a_claim_that_reads_it() -> None:
     """Else a claim that did not notice the fault would be spared it."""
-    for reads, fate in (("metrics.stones", Fate.EQUIVALENT), ("curves.fitness", Fate.SURVIVED)):
+    for reads, fate in (("metrics.reward", Fate.EQUIVALENT), ("curves.fitness", Fate.SURVIVED)):
         sound = judged()
         sound = replace(sound, sources=tuple(replace(one, reads=(reads,)) for one in sound.sources))
         row = noticed(cast(Comparison, _SameEnds()), [sound], [BLIND], [[judged()]], ())[key_of(sound)]

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from evoclaims.core.errors import UserError
-from evoclaims.judging.design import Design
+from evoclaims.judging.design import THREE_LOOKS, Design
 from evoclaims.judging.reading import TrialReading
 from evoclaims.paper import pilots
 from evoclaims.paper.reproduction import Reproduction
@@ -113,6 +113,8 @@ def test_trials_that_are_no_pilot_of_a_condition_say_why(
     assert "not been made" in why([])
     assert "of another condition" in why([replace(trials[0], condition="f" * 64)])
     assert "seeds of the tier's own trials (100, 101)" in why(trials, replace(SIX, first_seed=96))
+    third = Design(looks=THREE_LOOKS[:2], first_seed=80)  # a claim may have a third look, up to seed 109
+    assert "seeds of the tier's own trials (100, 101" in why(trials, third)
     assert "5 trials and a verdict looks at 6" in why(trials[:5])
     assert "seeds 102 crashed" in why([replace(trials[0], status="crashed"), *trials[1:]])
     assert "no 'furthest_solved'" in why([replace(trials[0], metrics={"mean_success": 1.0}), *trials[1:]])

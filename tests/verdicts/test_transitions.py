@@ -178,6 +178,14 @@ def test_a_variant_that_is_inconclusive_with_fewer_trials_says_nothing_of_the_de
     assert (row.hangs_on, row.fewer) == ((), frozenset())
 
 
+def test_a_variant_whose_trials_ran_out_of_time_says_nothing_of_the_detail() -> None:
+    late = Verdict(Outcome.INCONCLUSIVE, "", "", "f", n=10, without_result="a ran out of time (seeds 0)")
+    (row,) = matrix(
+        [_report("A", Outcome.SUPPORTED)], {"x": [replace(_report("A", Outcome.INCONCLUSIVE), verdict=late)]}
+    )
+    assert (row.hangs_on, row.fewer) == ((), {"x"})
+
+
 def test_support_that_a_null_agent_has_too_is_no_plain_support_under_a_variant() -> None:
     plain, vacuous = (
         _report("A", Outcome.REFUTED),

@@ -17,7 +17,7 @@ import pytest
 from evoclaims.claims.claim_names import claim_tests
 from evoclaims.claims.collected import Collected, Recorder, renew
 from evoclaims.claims.report_making import broken
-from evoclaims.claims.session import SESSION, Session
+from evoclaims.claims.session import SESSION, WITHIN, Session
 from evoclaims.core.errors import UserError, in_one_line
 from evoclaims.paper.config import SuiteConfig
 from evoclaims.verdicts.claim_report import ClaimReport
@@ -122,7 +122,8 @@ class _Run:
         self._collected: list[pytest.Item] = []
 
     def pytest_configure(self, config: pytest.Config) -> None:
-        """Keep the plugin from making a session of its own."""
+        """Keep the plugin from making a session of its own, and from ending the process."""
+        config.stash[WITHIN] = True
         config.stash[SESSION] = self._asked[0][0]
         self.files = " or ".join(config.getini("python_files"))
         self.functions = " or ".join(f"{name.removesuffix('*')}*" for name in config.getini("python_functions"))

@@ -212,3 +212,6 @@ class Session:
 
 SESSION: pytest.StashKey[Session] = pytest.StashKey()
 """Where a run of pytest keeps its session."""
+
+WITHIN: pytest.StashKey[bool] = pytest.StashKey()
+"""Whether a run of pytest is a part of a command, whose process goes on after it."""

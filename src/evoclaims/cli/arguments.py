@@ -91,7 +91,7 @@ def _running(add: _Add) -> None:
         "time that a batch of trials may take, such as 90s, 30min, 24h or none (24h, or that of pyproject.toml)",
     )
     _option(run, "--retry", "continue trials that ran out of time under this limit")
-    _option(run, "--first-seed SEED", "seed of the first trial (0)", type=int, default=0)
+    _option(run, "--first-seed SEED", "seed of the first trial (the tier's)", type=int)
 
     submit = add(
         "submit",

@@ -105,7 +105,7 @@ def main(options: argparse.Namespace) -> int:
     def has_changed(index: int) -> bool | None:
         now = judge(index)
         if now.trouble or _broken(now, claims) - broken_at_the_ends:
-            why[index] = now.trouble or "the claim is broken or not run there"
+            why[index] = now.trouble or "the claim is broken or not run there, or wants more time"
             return None
         cells = _cells(tried[0], now)
         if any(map(KINDS[kind], cells)):
@@ -155,8 +155,9 @@ def _unchanged(first: Judged, last: Judged, kinds: Collection[str]) -> str:
 
 
 def _broken(judged: Judged, claims: Collection[str]) -> set[tuple[str, Outcome]]:
-    """Return the claims that broke, did not run or are missing: no sign of the change, unless so at one of the ends."""
-    return {(name, outcome) for name in claims if not (outcome := judged.outcome(name)).judged}
+    """Return the claims that broke, did not run, are missing or want time: no sign of it, unless so at an end."""
+    late = {name for name, report in judged.reports.items() if report.wants_time}
+    return {(name, outcome) for name in claims if not (outcome := judged.outcome(name)).judged or name in late}
 
 
 def _tell(

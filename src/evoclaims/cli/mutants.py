@@ -118,12 +118,12 @@ def _run(project: Project, wanted: Mapping[Job, Condition], options: argparse.Na
 def _errors(
     sound: Sequence[ClaimReport], planted: Sequence[Planted], faulty: Sequence[Sequence[ClaimReport]]
 ) -> Iterator[str]:
-    """Yield a line on each fault whose trials ended, but made claims an error: the matrix calls it broken."""
+    """Yield a line on each fault that makes claims an error or leaves them without time, which is broken."""
     judged = {key_of(report) for report in sound if report.outcome.judged}
     for one, several in zip(planted, faulty, strict=True):
         reasons: dict[str, list[str]] = {}
         for report in several:
-            if report.outcome is Outcome.ERROR and key_of(report) in judged:
+            if (report.wants_time or report.outcome is Outcome.ERROR) and key_of(report) in judged:
                 reasons.setdefault(report.reason, []).append(key_of(report)[1])
         for reason, names in reasons.items():
             yield f"{one.name}: {', '.join(names)} cannot be judged: {reason}"

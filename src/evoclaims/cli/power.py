@@ -129,10 +129,12 @@ def _make(
             f"--trials takes {design.last.n} (as many as a verdict reads) to {MAX_TRIALS} trials per "
             f"condition, not {options.trials}."
         )
-    if set(seeds) & set(design.seeds(design.last.n)):
+    drift = project.reproduction.tier(options.tier).for_drift
+    own = design.seeds(max(design.with_third_look().last.n, design.last.n + max(drift.values(), default=0)))
+    if set(seeds) & set(own):
         raise UserError(
             f"The seeds {seeds[0]} to {seeds[-1]} overlap the {options.tier} tier's own "
-            f"({design.first_seed} to {design.seeds(design.last.n)[-1]}), and a pilot must not use trials "
+            f"({own[0]} to {own[-1]}), and a pilot must not use trials "
             "that verdicts read. Choose other seeds with --first-seed."
         )
     taken = {trial.seed for names in wanted for trial in pilots.other(names)} & set(seeds)

@@ -61,7 +61,8 @@ def main(options: argparse.Namespace) -> int:
     store = project.store
     tier, chosen = choose(project, options)
     n = trials_asked(options, tier)
-    seeds = range(options.first_seed, options.first_seed + n)
+    first = tier.design.first_seed if options.first_seed is None else options.first_seed
+    seeds = range(first, first + n)
     for names in chosen[:1]:  # an invalid seed is so for every condition: it is reported once, and nothing is run
         _ = [TrialSpec(tier.condition(*names), seed) for seed in seeds]
     order = WorkOrder(options.storage, options.tier, options.device, seeds[0], n, options.variant, options.time_limit)
@@ -117,7 +118,9 @@ def _print_matrix(project: Project, tier: str, variant: str) -> None:
         for name, outcome in row.outcomes.items():
             outcomes = f"{row.plain} -> {outcome}" if name in row.hangs_on else f"{outcome} either way"
             if name in row.fewer:
-                outcomes = f"{outcome} with fewer trials than decide the protocol's own verdict, {row.plain}"
+                outcomes = (
+                    f"{outcome} with fewer trials, or less time, than decide the protocol's own verdict, {row.plain}"
+                )
             if row.plain is Tally.NOT_RUN:
                 outcomes = f"{outcome}; not run under the protocol itself"
             print(f"  {row.claim}: {outcomes}")

@@ -193,8 +193,8 @@ def _queue() -> dict[str, Seen]:
     status, out, err = _answer(command)
     if status:
         raise UserError(f"SLURM does not say which jobs are queued (squeue: {' '.join(err.split())}); try again later.")
-    lines = (line.split("|", 3) for line in out.splitlines())
-    return {job: _seen(state, reason, nodes) for job, state, reason, nodes in lines}
+    lines = (line.split("|", 3) for line in out.splitlines())  # a site's own words may be among them
+    return {line[0]: _seen(*line[1:]) for line in lines if len(line) == 4}
 
 
 def _accounts(jobs: Sequence[str]) -> dict[str, Seen]:

@@ -13,7 +13,7 @@ from evoclaims.judging.design import Design, Look
 from evoclaims.judging.exact import MAX_TRIALS
 from evoclaims.judging.sample import Source, Trials, UnreadableTrialError
 from evoclaims.judging.scrutiny import Copies, copies, overspent
-from evoclaims.judging.verdict import Direction, Outcome, PValues, Verdict
+from evoclaims.judging.verdict import OUT_OF_TIME, Direction, Outcome, PValues, Verdict
 from evoclaims.trials.failed import place, why
 from evoclaims.trials.result import TrialResult
 
@@ -286,7 +286,7 @@ def _counted_once(assertion: Assertion, design: Design, look: Look, trials: Tria
 
 def _ended(assertion: Assertion, trials: Trials, *statuses: str) -> str:
     """Return a clause that names the trials which ended so, or nothing."""
-    words = {"diverged": "diverged", "timeout": "ran out of time"}
+    words = {"diverged": "diverged", "timeout": OUT_OF_TIME}
     found = [
         f"{len(seeds)} of {len(mine)} trials of {source.label} {words[status]} (seeds {', '.join(seeds)})"
         for source in assertion.sources()

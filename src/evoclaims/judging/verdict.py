@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Final
 
 from evoclaims.core.errors import UserError
 from evoclaims.judging.sample import Sample
@@ -207,6 +208,10 @@ class Evidence:
     def direction(self) -> Direction:
         """The direction of this part alone."""
         return self.outcome.direction
+
+
+OUT_OF_TIME: Final = "ran out of time"
+"""How a trial ended whose result is unknown, in `Verdict.without_result`."""
 
 
 @dataclass(frozen=True)

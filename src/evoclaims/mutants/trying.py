@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
@@ -12,7 +13,7 @@ from evoclaims.judging.drift import ALPHA, DriftCase, check_drift
 from evoclaims.judging.verdict import Outcome
 from evoclaims.mutants.mutant import Planted
 from evoclaims.paper.archive import Archive
-from evoclaims.paper.references import METRICS, load, path_of
+from evoclaims.paper.references import load, measures, path_of
 from evoclaims.paper.reproduction import Names, Reproduction, Variant
 from evoclaims.trials.result import TrialResult
 from evoclaims.trials.spec import Condition
@@ -70,17 +71,21 @@ class Comparison:
         pairs = zip(self._trials(self._sound(names)), self._trials(faulty), strict=True)
         return all(a and b and result(a) == result(b) for a, b in pairs)
 
-    def drifted(self, names: Names, faulty: Condition) -> bool:
-        """Whether faulty trials drift from the reference trials, at the drift check's strictest correction."""
+    def drifted(self, names: Names, faulty: Condition, reads: Collection[str]) -> bool:
+        """Whether faulty trials drift from the reference trials, at the drift check's strictest correction.
+
+        Tested is what claims read of them, too, as in a run of pytest.
+        """
         reference = load(path_of(self.reproduction.references, self.tier, *names))
+        new = tuple(trial for trial in self._trials(faulty) if trial is not None)
         case = DriftCase(
             label=" on ".join(names),
             condition=faulty.id,
-            new=tuple(trial for trial in self._trials(faulty) if trial is not None),
+            new=new,
             reference=tuple(
                 replace(trial, condition=faulty.id) for trial in reference if trial.condition == self._sound(names).id
             ),
-            metrics=METRICS,
+            metrics=measures(new, reads),
         )
         return check_drift([case], ALPHA / max(1, len(self.used))).drifted
 
@@ -115,13 +120,17 @@ def noticed(
     @cache
     def compared(fault: str, names: Names, curves: tuple[str, ...]) -> tuple[bool, bool]:
         condition = conditions[fault, names]
-        return comparison.equivalent(names, condition, curves), comparison.drifted(names, condition)
+        return comparison.equivalent(names, condition, curves), comparison.drifted(names, condition, reads[names])
 
     conditions = {(one.name, names): condition for one in planted for names, condition in one.conditions.items()}
+    reads: dict[Names, set[str]] = defaultdict(set)
+    for source in (source for report in sound for source in report.sources):
+        reads[source.method, source.task].update(source.reads)
 
     def attempt(report: ClaimReport, one: Planted, touched: Sequence[Names]) -> Attempt | None:
-        outcome = reports[one.name, key_of(report)].outcome
-        if any((one.name, names) in failed for names in touched):
+        under = reports[one.name, key_of(report)]
+        outcome = under.outcome
+        if under.wants_time or any((one.name, names) in failed for names in touched):
             became = Fate.BROKEN
         elif outcome is Outcome.NOT_RUN:
             return None

@@ -117,7 +117,7 @@ def unfit(trials: Sequence[TrialResult], condition: Condition, design: Design, r
         return "it has not been made"
     if trials[0].condition != condition.id:
         return "it is of another condition, since method, task or budget have changed"
-    shared = {trial.seed for trial in trials} & set(design.seeds(design.last.n))
+    shared = {trial.seed for trial in trials} & set(design.seeds(design.with_third_look().last.n))
     if shared:
         return f"it has seeds of the tier's own trials ({', '.join(map(str, sorted(shared)))})"
     if len(trials) < design.last.n:

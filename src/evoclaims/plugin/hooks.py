@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from typing import TYPE_CHECKING, Any
@@ -240,8 +241,9 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 
 @pytest.hookimpl(trylast=True)
 def pytest_unconfigure(config: pytest.Config) -> None:
-    """End the process if trials that did not return in time still run in it."""
-    if _ended in config.stash:
+    """End the process if trials that did not return in time still run in it, unless a command goes on in it."""
+    sessions = sys.modules.get("evoclaims.claims.session")  # not imported for other projects
+    if _ended in config.stash and not (sessions and config.stash.get(sessions.WITHIN, False)):
         end_without(int(config.stash[_ended].exitstatus))
 
 

@@ -14,7 +14,7 @@ from msgspec import convert
 from evoclaims.core.canonical import as_plain
 from evoclaims.core.errors import UserError
 from evoclaims.core.files import file_name, write_atomically
-from evoclaims.judging.verdict import Outcome, Verdict
+from evoclaims.judging.verdict import OUT_OF_TIME, Outcome, Verdict
 from evoclaims.verdicts.readings import ReadAs, depends
 from evoclaims.verdicts.source_trials import SourceTrials
 
@@ -151,6 +151,12 @@ class ClaimReport:
             return Tally.VACUOUS
         insensitive = (self.outcome, self.tried) == (Outcome.SUPPORTED, Tried.INSENSITIVE)
         return Tally.INSENSITIVE if insensitive else Tally(self.outcome.value)
+
+    @property
+    def wants_time(self) -> bool:
+        """Whether it is undecided and some of its trials ran out of time: with more time it may be decided."""
+        ended = self.verdict.without_result if self.verdict else ""
+        return self.outcome is Outcome.INCONCLUSIVE and OUT_OF_TIME in ended
 
     @property
     def is_vacuous(self) -> bool:

@@ -67,7 +67,7 @@ class Attempt:
         outcome: of the claim with the fault, if that changed it; else the claim's own.
         fate: killed by the verdict: the outcome differs from the one without the fault; killed by drift: the outcome is
             the same, but the drift check finds the fault; equivalent: the faulty trials equal the sound ones, so that
-            no check can find it; broken: the faulty trials crashed, which says nothing about the claim.
+            no check can find it; broken: the faulty trials crashed or ran out of time, or the claim became an error.
     """
 
     mutant: str
