@@ -203,6 +203,8 @@ def test_a_test_gives_exactly_one_verdict(session: Session, says: Claim) -> None
         verdict(True)  # type: ignore[arg-type]
     with pytest.raises(UserError, match=r"takes an assertion about trials.*not 'mean success over levels' alone"):
         verdict(better.mean_success)  # type: ignore[arg-type]
+    with pytest.raises(UserError, match=r"not 'solves every level' alone: say in how many it holds, as in .in_most_tr"):
+        verdict(better.solves_every_level)  # type: ignore[arg-type]
     with pytest.raises(UserError, match=r"was given the function in_most_trials itself: call it, as in in_most_tria"):
         verdict(better.solves_every_level.in_most_trials)  # type: ignore[arg-type]
     assert verdict.report is None

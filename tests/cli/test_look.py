@@ -164,6 +164,8 @@ CHAMPION = ("maze", "--method=random", "--seed=4")
         (("parity", "--tier=full"), "there is nothing to look at. No task of this tier has one."),
         (("parity", "--method=right"), "parity has no robot and no ground"),
         (("maze", "--as=gif"), "--as gif shows what a champion does; name its method with --method."),
+        (("maze", "--seed=0"), "--seed 0 shows what a champion does; name its method with --method."),
+        (("maze", "--episode=3"), "--episode 3 shows what a champion does; name its method with --method."),
         (("maz", "--method=random"), "There is no task for random named 'maz'. Did you mean 'maze'?"),
         (
             ("maze", "--method=random", "--seed=77"),

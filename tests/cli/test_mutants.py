@@ -47,7 +47,8 @@ def test_a_claim_notices_a_blind_task_and_no_fault_in_what_never_learns(
     assert right.untried == ()
     assert "planted faults change a verdict" in out.splitlines()[-2]
     before = len(stored.ids())
-    assert evoclaims("mutants", "--mutant=blind")[0] == 0
+    status, out, _ = evoclaims("mutants", "--mutant=blind")
+    assert (status, out.splitlines()[-1]) == (0, f"{Path('mutants.toml').absolute()} is as it was")
     assert len(stored.ids()) == before
     assert load(Path("mutants.toml")) == matrix
 
@@ -82,6 +83,7 @@ def test_a_users_mistake_is_one_sentence(evoclaims: Evoclaims, stored: Store) ->
     for arguments, said in (
         (("--mutant=blnd",), "There is no mutant named 'blnd'. Did you mean 'blind'?"),
         (("--of=neat",), "There is no method or task named 'neat'."),
+        (("--of=right", "--mutant=wrong-row"), "wrong-row is no fault of right. It can be planted in: parity."),
     ):
         status, _, err = evoclaims("mutants", *arguments)
         assert (status, err.count("\n")) == (2, 1)

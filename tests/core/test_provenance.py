@@ -124,6 +124,11 @@ def test_a_repository_gives_its_commit_and_is_dirty_when_a_tracked_file_was_edit
     git("commit", "--quiet", "-m", "a change")
     (repository / "notes.txt").write_text("results\n")  # which is not tracked
     assert provenance.git_state() == {"sha": git("rev-parse", "HEAD"), "dirty": False}
+    (repository / "folder").mkdir()
+    (repository / "folder" / "forgotten.py").write_text("x = 1\n")
+    assert provenance.git_state() == {"sha": git("rev-parse", "HEAD"), "dirty": True}
+    (repository / ".gitignore").write_text("folder\n")
+    assert provenance.git_state() == {"sha": git("rev-parse", "HEAD"), "dirty": False}
     (repository / "code.py").write_text("x = 2\n")
     assert provenance.git_state() == {"sha": git("rev-parse", "HEAD"), "dirty": True}
 

@@ -7,6 +7,7 @@ import json
 import re
 import shlex
 import shutil
+import subprocess
 import sys
 from pathlib import Path
 
@@ -51,6 +52,22 @@ def _write(folder: Path, names: set[str]) -> None:
 def test_the_smoke_test_that_is_shown_is_one_of_the_paper() -> None:
     (shown,) = re.findall(r"```python\n(@claim\.smoke.*?)```", GUIDE, flags=re.DOTALL)
     assert shown in (Path(__file__).parents[2] / "claims" / "test_stepping_stones.py").read_text(encoding="utf-8")
+
+
+def test_the_faults_that_are_shown_for_a_new_project_change_what_it_trains_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "mutants.md").read_text(encoding="utf-8")
+    (shown,) = re.findall(r"```python\n(from dataclasses[^`]*?our_paper.*?)```", page, flags=re.DOTALL)
+    assert main(["new", str(tmp_path / "mine")]) == 0
+    (tmp_path / "mine/reproductions/our_paper/mutants.py").write_text(shown, encoding="utf-8")
+    faults = "import json, reproductions.our_paper as paper\nfrom reproductions.our_paper.mutants import MUTANTS\n"
+    faults += "sound = paper.REPRODUCTION.tiers['smoke'].conditions\n"
+    faults += "print(json.dumps({name: one.targets(sound) for name, one in MUTANTS.items()}))"
+    ran = subprocess.run(
+        [sys.executable, "-c", faults], cwd=tmp_path / "mine", capture_output=True, text=True, check=True
+    )
+    assert json.loads(ran.stdout) == {"tiny-steps": ["hill_climber"], "half-paid": ["majority"]}
 
 
 def test_what_the_guide_shows_is_short() -> None:

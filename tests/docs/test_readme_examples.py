@@ -81,11 +81,14 @@ def test_the_table_of_verdicts_is_what_the_committed_trials_give(
 def test_the_new_project_runs_with_the_method_and_the_claim_that_are_added(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    new, enter, run = _commands(PROJECT)
+    new, enter, *begin, run = _commands(PROJECT)
     folder = tmp_path / enter[1]
     monkeypatch.chdir(tmp_path)
     assert cli.main(new[1:]) == 0
-    assert f"wrote 6 files to {folder}; next:" in capsys.readouterr().out
+    assert f"wrote 7 files to {folder}; next:" in capsys.readouterr().out
+    who = ["-c", "user.name=someone", "-c", "user.email=someone@example.org"]
+    for command in begin:
+        subprocess.run([command[0], *who, *command[1:]], cwd=folder, check=True, capture_output=True)
     (package,) = re.findall(r"`(reproductions/\S+\.py)`", README)
     (method,) = re.findall(r"`(METHODS\[.*?)`", README)
     text = (folder / package).read_text()

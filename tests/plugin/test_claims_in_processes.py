@@ -125,5 +125,6 @@ def test_ctrl_c_ends_the_processes_and_another_keeps_pytest_from_no_end(project:
     assert b"KeyboardInterrupt" in output
     assert b"Traceback" not in output
     assert output.count(b"evoclaims: the run is ending; what has run is kept.") == 1
+    assert b"\ninterrupted; what has run is kept, and the same command goes on from there\n" in output
     with pytest.raises(ProcessLookupError):
         os.kill(int(Path("begun").read_text()), 0)

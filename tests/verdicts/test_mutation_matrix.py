@@ -103,6 +103,8 @@ def test_a_row_is_about_a_verdict_of_the_same_conditions_rules_and_outcome_and_n
         assert described(matrix, other) == NOT_TRIED
     assert described({("smoke", "A"): row(a=Fate.KILLED)}, judged) == "Planted faults: 1 of 1 change this verdict."
     assert described({("smoke", "A"): row(untried=("a",))}, judged) == NOT_TRIED
+    begun = replace(row(a=Fate.KILLED, untried=("ppo: a",)), methods=("neat", "ppo"))
+    assert described({("smoke", "A"): begun}, judged) == "Planted faults: 1 of 1 change this verdict."
 
 
 MATRIX: Matrix = {
@@ -110,13 +112,14 @@ MATRIX: Matrix = {
     ("smoke", "B[x]"): row(a=Fate.SURVIVED, c=Fate.SURVIVED),
     ("smoke", "C"): replace(row(a=Fate.KILLED), methods=("neat", "ppo")),
     ("smoke", "D"): row(untried=("neat: a",)),
+    ("smoke", "E"): replace(row(a=Fate.KILLED, untried=("ppo: a",)), methods=("neat", "ppo")),
     ("full", "A"): row(b=Fate.KILLED),
 }
 
 
 def test_the_score_counts_each_mutant_once_by_the_best_that_notices_it() -> None:
     assert score(MATRIX, "smoke") == (
-        "Mutation score (smoke): 2 of 4 planted faults change a verdict, 1 more are found by the drift check; of 3 "
+        "Mutation score (smoke): 2 of 4 planted faults change a verdict, 1 more are found by the drift check; of 4 "
         "claims 1 are insensitive, and 1 notice faults in some of their methods alone."
     )
     assert score(MATRIX, "middle") == "Mutation score (middle): not tried."

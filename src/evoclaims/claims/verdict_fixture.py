@@ -28,7 +28,12 @@ class VerdictFixture:
             UserError: for a second assertion, or a value that is not one.
         """
         if not isinstance(assertion, Assertion):
-            alone = isinstance(assertion, Measure | Event | Profile)
+            if isinstance(assertion, Event):
+                raise UserError(
+                    f"verdict(...) takes an assertion about trials, not {assertion.name!r} alone: say in how many it "
+                    "holds, as in .in_most_trials() or .in_every_trial()."
+                )
+            alone = isinstance(assertion, Measure | Profile)
             if callable(assertion):
                 name = getattr(assertion, "__name__", type(assertion).__name__)
                 raise UserError(f"verdict(...) was given the function {name} itself: call it, as in {name}().")

@@ -167,14 +167,14 @@ def _reading(add: _Add) -> None:
     look = add("look", "draw a robot's task, or show what a stored champion does in it")
     look.add_argument("task", help="the task")
     _option(look, "--method METHOD", "the method whose champion is shown; without it only the task is drawn")
-    _option(look, "--seed SEED", "the trial's seed (0)", type=int, default=0)
+    _option(look, "--seed SEED", "the trial's seed (0)", type=int)
     _option(
         look,
         "--as FORM",
         "path (default): a picture of the paths of all episodes; gif: an episode, animated",
         dest="form",
     )
-    _option(look, "--episode N", "number of the evaluation's episode, from 0 (0)", type=int, default=0)
+    _option(look, "--episode N", "number of the evaluation's episode, from 0 (0)", type=int)
     _option(
         look, "--out FILE", "file to write (figures/TASK.svg, figures/METHOD-TASK-SEED-FORM.…); pictures are svg or png"
     )

@@ -38,8 +38,9 @@ def main(options: argparse.Namespace) -> int:
 def _task_alone(options: argparse.Namespace, project: Project) -> tuple[Path, bytes]:
     """Return the file to write without --method, and its contents."""
     tier = project.reproduction.tier(options.tier)
-    if options.form is not None:
-        raise UserError(f"--as {options.form} shows what a champion does; name its method with --method.")
+    for option, value in (("as", options.form), ("seed", options.seed), ("episode", options.episode)):
+        if value is not None:
+            raise UserError(f"--{option} {value} shows what a champion does; name its method with --method.")
     # Tasks of one name share a scene, even if some methods see more of it.
     tasks = {name: condition.task for (_, name), condition in tier.conditions.items()}
     if options.task not in tasks:
@@ -53,22 +54,23 @@ def _champion(options: argparse.Namespace, project: Project) -> tuple[Path, byte
     """Return the file to write with --method, and its contents."""
     tier = project.reproduction.tier(options.tier)
     name = "path" if options.form is None else options.form
+    seed, episode = options.seed or 0, options.episode or 0
     if name not in FORMS:
         raise UnknownNameError("way to look at a champion", name, FORMS)
     task = _with_robot(tier, options.task, tier.condition(options.method, options.task).task)
-    if not 0 <= options.episode < task.examined_episodes:
+    if not 0 <= episode < task.examined_episodes:
         raise UserError(
             f"The evaluation has {task.examined_episodes} episodes, 0 to {task.examined_episodes - 1}; "
-            f"--episode is {options.episode}."
+            f"--episode is {episode}."
         )
-    path, ending = _target(options.out, f"{options.method}-{options.task}-{options.seed}-{name}", FORMS[name])
-    trial = load(project, options.tier, options.method, options.task, options.seed)
+    path, ending = _target(options.out, f"{options.method}-{options.task}-{seed}-{name}", FORMS[name])
+    trial = load(project, options.tier, options.method, options.task, seed)
     outings = run_again(trial, task, devices.choose(options.device)[0])
-    title = f"{trial.title}, seed {options.seed}"
+    title = f"{trial.title}, seed {seed}"
     if name == "gif":
-        positions, reached = outings.positions[options.episode], outings.reached[options.episode]
+        positions, reached = outings.positions[episode], outings.reached[episode]
         end = f"{'reaches the goal' if reached else 'ends'} after {len(positions):,} steps"
-        data = pictures.film(task, motion(task.scene, positions), f"{title}, episode {options.episode}: {end}")
+        data = pictures.film(task, motion(task.scene, positions), f"{title}, episode {episode}: {end}")
     else:
         count = f"\n{sum(outings.reached)} of {len(outings.reached)} episodes reach the goal" * bool(marks(task))
         data = pictures.draw(task, outings.torsos, f"{title}{count}", ending)
@@ -78,7 +80,7 @@ def _champion(options: argparse.Namespace, project: Project) -> tuple[Path, byte
         print(
             f"The share of episodes that reach the goal is {again:g} here, and {recorded:g} in the record: these are "
             f"not quite the episodes that were judged. `evoclaims champion {options.method} --on {options.task} --tier "
-            f"{options.tier} --seed {options.seed}{project.store.option}` compares all values."
+            f"{options.tier} --seed {seed}{project.store.option}` compares all values."
         )
     return path, data
 

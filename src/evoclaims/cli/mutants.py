@@ -61,8 +61,9 @@ def main(options: argparse.Namespace) -> int:
     reports = mutated.judge_variants([(options.tier, one.name) for one in planted])
     broken = {(one.job.fault, one.job.names) for one in failed if not one.untried}
     path = project.reproduction.folder / mutation_matrix.FILE
+    before = mutation_matrix.load(path)
     matrix = merged(
-        mutation_matrix.load(path),
+        before,
         noticed(comparison, claims, planted, reports, broken),
         options.tier,
         {key_of(report): [one.name for one in every if one.touching(report)] for report in claims if report.has_test},
@@ -73,7 +74,8 @@ def main(options: argparse.Namespace) -> int:
             print("\n".join(_told(claim, row)))
     for line in (*_errors(claims, planted, reports), *edits([report for several in reports for report in several])):
         print(f"evoclaims: {line}", file=sys.stderr)
-    print(f"{score(matrix, options.tier)}\nwrote {path}: look at the changes and commit them")
+    ends = "is as it was" if matrix == before else "is written: look at the changes and commit them"
+    print(f"{score(matrix, options.tier)}\n{path} {ends}")
     return int(bool(failed))
 
 
@@ -94,7 +96,11 @@ def _chosen(every: Sequence[Planted], options: argparse.Namespace) -> list[Plant
     ):
         if wanted is not None and wanted not in known:
             raise UnknownNameError(kind, wanted, known)
-    return [one for one in every if options.mutant in (None, one.mutant) and options.of in (None, one.target)]
+    chosen = [one for one in every if options.mutant in (None, one.mutant) and options.of in (None, one.target)]
+    if not chosen:
+        targets = ", ".join(one.target for one in every if one.mutant == options.mutant)
+        raise UserError(f"{options.mutant} is no fault of {options.of}. It can be planted in: {targets}.")
+    return chosen
 
 
 def _run(project: Project, wanted: Mapping[Job, Condition], options: argparse.Namespace) -> tuple[Ended, ...]:

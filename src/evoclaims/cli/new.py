@@ -33,6 +33,9 @@ PARTS: Final = ("docs", "reproductions", "claims", "pyproject.toml")
 """What a project consists of, with the pages that its claims name, if any; its settings come last, so that a part of
 one is not."""
 
+GITIGNORE: Final = "__pycache__/\n"
+"""Else these files are committed, and trials run changed files as soon as Python has written them again."""
+
 NEXT: Final = "next.txt"
 """What to do next, in one or more layers."""
 
@@ -93,9 +96,10 @@ def _write(layers: Sequence[Path], folder: Path) -> int:
         for name, path in files.items():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(path, folder / name)
+        (folder / ".gitignore").write_text(GITIGNORE, encoding="utf-8")
     except OSError as error:
         reason = error.strerror or error
         raise UserError(
             f"Cannot write a project to {folder}: {reason}. Delete what is there, or name another."
         ) from error
-    return len(files)
+    return len(files) + 1

@@ -90,6 +90,9 @@ def main(options: argparse.Namespace) -> int:
             )
             + (f", made with other versions than are installed: {upgraded}" if upgraded else "")
         )
+        dirty = sum(bool((trial.provenance.get("git") or {}).get("dirty")) for trial in results[:size])
+        if dirty:
+            print(f"  {dirty} of them ran code with uncommitted changes: nobody may be able to run that code again")
         written_seeds = {trial.seed for trial in results[:size]}
         left = {record.seed for record in stored if is_final(record)} - written_seeds
         if left:

@@ -133,17 +133,18 @@ def same_bits(one: Mapping[str, Any], other: Mapping[str, Any], but: str = "") -
 def git_state() -> dict[str, Any] | None:
     """Return {"sha", "dirty"} of the repository around the current folder, or None when git cannot tell.
 
-    "sha" is None before the first commit. "dirty" means that a tracked file differs from that commit; untracked
-    files do not count, as in `git describe --dirty`.
+    "sha" is None before the first commit. "dirty" means that a tracked file differs from that commit, or that below
+    the current folder there is code, or a robot, that is neither tracked nor ignored: a clone would lack it.
     """
     if _git("rev-parse", "--is-inside-work-tree") != "true":
         return None
     status = _git("status", "--porcelain", "--untracked-files=no")
     if status is None:
         return None
+    status = status or _git("ls-files", "--others", "--exclude-standard", "--", "*.py", "*.xml")
     sha = _git("rev-parse", "--verify", "--quiet", "HEAD")
     known = sha is not None and re.fullmatch(r"[0-9a-f]{40,64}", sha) is not None
-    return {"sha": sha if known else None, "dirty": status != ""}
+    return {"sha": sha if known else None, "dirty": bool(status)}
 
 
 def _git(*arguments: str) -> str | None:

@@ -56,6 +56,11 @@ class Summary:
         self._reasons: Mapping[tuple[str, str], str] = {}
         self._troubles: list[str] = []
         self._died: dict[str, str] = {}
+        self._interrupted = False
+
+    def pytest_keyboard_interrupt(self, excinfo: pytest.ExceptionInfo[BaseException]) -> None:
+        """Note that Ctrl-C has ended the run, and not `pytest.exit`."""
+        self._interrupted = excinfo.type is KeyboardInterrupt
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Keep a claim's report."""
@@ -190,6 +195,8 @@ class Summary:
 
     def pytest_terminal_summary(self, terminalreporter: Any, exitstatus: int) -> None:
         """Print the verdict table and its details."""
+        if self._interrupted and self._config.stash.get(KNOWN, ()):
+            terminalreporter.write_line("interrupted; what has run is kept, and the same command goes on from there")
         if not self.reports:
             for trouble in [*self._troubles, *self._died.values()]:
                 terminalreporter.write_line(self._safe(f"ERROR: {trouble}"), red=True)

@@ -150,7 +150,7 @@ def described(matrix: Matrix, report: ClaimReport) -> str:
         return "Planted faults: not tried."
     fates = [attempt.fate for attempt in row.attempts if attempt.fate.counts]
     text = f"Planted faults: {fates.count(Fate.KILLED)} of {len(fates)} change this verdict"
-    if row.unnoticed:
+    if row.unnoticed and not row.untried:
         text += f", none of those in {' or '.join(row.unnoticed)}"
     return f"Insensitive. {text}." if row.tried is Tried.INSENSITIVE else f"{text}."
 
@@ -253,7 +253,7 @@ def score(matrix: Matrix, tier: str) -> str:
     by_verdict = sum(Fate.KILLED in found for found in fates.values())
     by_drift = sum(Fate.DRIFTED in found and Fate.KILLED not in found for found in fates.values())
     found = Counter(row.tried for row in rows)
-    partly = sum(row.tried is Tried.SENSITIVE and bool(row.unnoticed) for row in rows)
+    partly = sum(row.tried is Tried.SENSITIVE and bool(row.unnoticed) and not row.untried for row in rows)
     return (
         f"Mutation score ({tier}): {by_verdict} of {len(fates)} planted faults change a verdict, "
         f"{by_drift} more are found by the drift check; of {len(rows) - found[Tried.NOT_TRIED]} claims "
