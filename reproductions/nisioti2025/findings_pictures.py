@@ -107,7 +107,15 @@ def _finish(axis: Any, figure: Figure) -> None:
 def _legend(axis: Any) -> None:
     """List each label once."""
     handles = dict(zip(*reversed(axis.get_legend_handles_labels()), strict=True))
-    axis.legend(handles.values(), handles.keys(), frameon=False, fontsize=6.5, loc="best")
+    axis.legend(
+        handles.values(),
+        handles.keys(),
+        ncols=len(handles),
+        frameon=False,
+        fontsize=6.5,
+        loc="lower center",
+        bbox_to_anchor=(0.5, 1.0),  # above the panel: within it, it would hide dots
+    )
 
 
 def drawn(name: str) -> bytes:
