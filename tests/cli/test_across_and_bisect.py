@@ -79,6 +79,16 @@ def test_a_release_that_cannot_be_judged_is_gone_round_and_told(
     assert ("it cannot be installed" in out) == (instead not in ("error", "late"))
 
 
+@pytest.mark.parametrize(("release", "option"), [("1.0", "--good"), ("1.8", "--bad")])
+def test_an_end_whose_trials_ran_out_of_time_is_refused(
+    evoclaims: Evoclaims, outcomes: dict[str, str], release: str, option: str
+) -> None:
+    outcomes[release] = "late"
+    status, _, err = evoclaims(*BISECT)
+    assert (status, err.count("\n")) == (2, 1)
+    assert f"pebble {release}, named by {option}, does not decide a, since trials ran out of time" in err
+
+
 def test_a_claim_that_is_gone_has_changed_and_a_release_without_it_alone_says_nothing(
     evoclaims: Evoclaims, outcomes: dict[str, str]
 ) -> None:

@@ -176,6 +176,9 @@ def test_faulty_trials_of_other_versions_than_the_sound_ones_are_not_compared(
     faulty = [trial for trial in stored.results([]) if trial.id not in sound]
     forget(stored, faulty)
     for trial in faulty:
+        if trial.seed == 0:
+            stored.put(trial, {})
+            continue
         versions = {**trial.provenance["versions"], "jax": "0.4.1"}
         stored.put(replace(trial, provenance={**trial.provenance, "versions": versions}), {})
     status, _, err = evoclaims("mutants", "--stored", "--mutant=blind")

@@ -70,7 +70,7 @@ def test_a_starter_project_of_each_kind_passes_as_it_is(
     folder = tmp_path / "mine"
     status, said, _ = _new(capsys, str(folder), "--with", kind)
     assert (status, f"wrote {len(_files(folder))} files to {folder}; next:" in said) == (0, True)
-    assert (folder / ".gitignore").read_text() == "__pycache__/\n"
+    assert (folder / ".gitignore").read_text().splitlines() == ["__pycache__/", ".venv/"]
     named = set(re.findall(r"[\w/]+\.(?:py|csv)\b", said.replace("docs/", "")))
     assert {Path(name).name for name in named} <= {Path(name).name for name in _files(folder)}
     ran = _run(folder, "-W", "error", "-m", "pytest", "-m", "smoke", "-p", "no:xdist", "--claims-json=out.json")

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from tiny_project import Evoclaims, Project
 
+from evoclaims.judging.design import SEQUENTIAL
+from evoclaims.paper.reproduction import Reproduction
 from evoclaims.trials.spec import Condition
 from evoclaims.trials.store import Store
 
@@ -151,6 +154,14 @@ def test_a_condition_that_breaks_does_not_stop_the_others(piloted: Evoclaims, pr
     assert (status, rows(out)["a"][1]) == (1, "1.000")
     assert "broken on parity (smoke) failed: RuntimeError: out of order" in err
     assert "d: no pilot of broken on parity" in out
+
+
+def test_a_pilot_has_no_seeds_of_a_third_look(evoclaims: Evoclaims, monkeypatch: pytest.MonkeyPatch) -> None:
+    plain = Reproduction.tier
+    monkeypatch.setattr(Reproduction, "tier", lambda self, *names: replace(plain(self, *names), design=SEQUENTIAL))
+    status, _, err = evoclaims("power", "--run", "--first-seed=10")
+    assert status == 2
+    assert "The seeds 10 to 59 overlap the smoke tier's own (0 to 29)" in err
 
 
 @pytest.mark.parametrize(

@@ -124,6 +124,10 @@ def test_a_repository_gives_its_commit_and_is_dirty_when_a_tracked_file_was_edit
     git("commit", "--quiet", "-m", "a change")
     (repository / "notes.txt").write_text("results\n")  # which is not tracked
     assert provenance.git_state() == {"sha": git("rev-parse", "HEAD"), "dirty": False}
+    packages = repository / "env" / "lib" / "site-packages"
+    packages.mkdir(parents=True)
+    (packages / "installed.py").write_text("x = 1\n")
+    assert provenance.git_state() == {"sha": git("rev-parse", "HEAD"), "dirty": False}
     (repository / "folder").mkdir()
     (repository / "folder" / "forgotten.py").write_text("x = 1\n")
     assert provenance.git_state() == {"sha": git("rev-parse", "HEAD"), "dirty": True}

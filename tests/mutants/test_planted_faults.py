@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -107,6 +108,19 @@ def test_a_fault_in_place_of_a_parameter_is_one_sentence() -> None:
     """A copy of the component with another parameter could not be made."""
     with pytest.raises(UserError, match="_TwoBits replaces 'bits', a parameter of 'n_parity'"):
         plant(_TwoBits, PARITY)
+
+
+@dataclass(frozen=True)
+class _Priced(NParity):
+    """A task with parameters that are called as functions of `FaultyTask` are."""
+
+    paid: float = 1.0
+    says: str = "a word"
+
+
+def test_a_parameter_may_have_the_name_of_a_function_of_ours() -> None:
+    assert plant(faults.Minimizes, CMA_ES).sound == CMA_ES
+    assert plant(faults.Blind, _Priced(3)).sound == _Priced(3)
 
 
 def test_two_faults_in_one_component_are_one_sentence() -> None:

@@ -79,8 +79,14 @@ def test_trials_out_of_time_are_broken_and_kill_nothing() -> None:
     late = judged("inconclusive")
     assert late.verdict is not None
     late = replace(late, verdict=replace(late.verdict, without_result="3 of 10 trials of neat ran out of time"))
-    for faulty, fate in ((late, Fate.BROKEN), (judged("inconclusive"), Fate.KILLED)):
-        row = tried(BLIND, judged(), faulty)
+    undecided, refuted = judged("inconclusive"), judged("refuted")
+    for sound, faulty, fate in (
+        (judged(), late, Fate.BROKEN),
+        (judged(), undecided, Fate.KILLED),
+        (late, refuted, Fate.BROKEN),
+        (undecided, refuted, Fate.KILLED),
+    ):
+        row = tried(BLIND, sound, faulty)
         assert row is not None
         assert row.named(fate) == ("maze: blind",)
 

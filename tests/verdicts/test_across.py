@@ -22,6 +22,7 @@ from evoclaims.trials.spec import Budget, Condition
 from evoclaims.trials.store import Store
 from evoclaims.verdicts.across import Across, Judged, across, judged
 from evoclaims.verdicts.source_trials import SourceTrials
+from evoclaims.verdicts.upgrade import Succession, upgrade
 
 CONDITION = Condition(HandBuilt(), NParity(2), "direct", Budget(generations=1, reports=1))
 HERE = {"device": {"platform": "cpu", "kind": "cpu"}, "machine": "Linux", "depends_on": ["jax"]}
@@ -195,3 +196,18 @@ def test_rows_for_programs_have_numbers_and_one_for_each_environment_without_ver
     assert (three["versions"], three["verdict_changed"], three["bits_changed"]) == ({"jax": ["3"]}, True, 10)
     assert rows[-1] == {"environment": "jax 5", "trouble": "no such release"}
     assert len(rows) == 4 * 2 + 1
+
+
+def test_trials_out_of_time_are_no_drift_and_no_change_of_bits() -> None:
+    """A slow release has the same results, as far as anybody knows."""
+    before = tuple(_trial(seed, "1") for seed in range(10))
+    now = tuple(
+        replace(_trial(seed, "2"), status="timeout", digest="9" * 64, metrics={}) if seed > 3 else _trial(seed, "2")
+        for seed in range(10)
+    )
+    one = Succession("ours", {"jax": "1"}, {"jax": "2"}, before, now, again=10)
+    found = upgrade([one])
+    assert ([new.seed for _, new in one.pairs], one.changed) == ([0, 1, 2, 3], 0)
+    assert not any(row.drifted for row in found.drift.rows)
+    late = replace(one, now=now[4:])
+    assert "(another machine or device, or out of time)" in " ".join(upgrade([late]).lines)

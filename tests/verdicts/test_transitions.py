@@ -184,6 +184,10 @@ def test_a_variant_whose_trials_ran_out_of_time_says_nothing_of_the_detail() -> 
         [_report("A", Outcome.SUPPORTED)], {"x": [replace(_report("A", Outcome.INCONCLUSIVE), verdict=late)]}
     )
     assert (row.hangs_on, row.fewer) == ((), {"x"})
+    (row,) = matrix(
+        [replace(_report("A", Outcome.INCONCLUSIVE), verdict=late)], {"x": [_report("A", Outcome.SUPPORTED)]}
+    )
+    assert (row.hangs_on, row.fewer) == ((), {"x"})
 
 
 def test_support_that_a_null_agent_has_too_is_no_plain_support_under_a_variant() -> None:

@@ -86,6 +86,11 @@ def main(options: argparse.Namespace) -> int:
                 f"{tried[index].label}, named by {option}, cannot be judged: {tried[index].trouble}. If "
                 "the release itself is the cause, name another one."
             )
+        if late := [name for name, report in tried[index].reports.items() if report.wants_time]:
+            raise UserError(
+                f"{tried[index].label}, named by {option}, does not decide {', '.join(late)}, since trials ran out of "
+                "time. Give them more: time_limit in pyproject.toml."
+            )
     at_the_end = _cells(tried[0], tried[last])
     kinds = [kind for kind in KINDS if options.by in (None, kind) and any(map(KINDS[kind], at_the_end))]
     if not kinds:

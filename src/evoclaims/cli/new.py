@@ -33,7 +33,7 @@ PARTS: Final = ("docs", "reproductions", "claims", "pyproject.toml")
 """What a project consists of, with the pages that its claims name, if any; its settings come last, so that a part of
 one is not."""
 
-GITIGNORE: Final = "__pycache__/\n"
+GITIGNORE: Final = "__pycache__/\n.venv/\n"
 """Else these files are committed, and trials run changed files as soon as Python has written them again."""
 
 NEXT: Final = "next.txt"

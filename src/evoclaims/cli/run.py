@@ -119,7 +119,7 @@ def _print_matrix(project: Project, tier: str, variant: str) -> None:
             outcomes = f"{row.plain} -> {outcome}" if name in row.hangs_on else f"{outcome} either way"
             if name in row.fewer:
                 outcomes = (
-                    f"{outcome} with fewer trials, or less time, than decide the protocol's own verdict, {row.plain}"
+                    f"{outcome}, {row.plain} under the protocol itself: too few trials, or too little time, to tell"
                 )
             if row.plain is Tally.NOT_RUN:
                 outcomes = f"{outcome}; not run under the protocol itself"

@@ -130,6 +130,10 @@ def same_bits(one: Mapping[str, Any], other: Mapping[str, Any], but: str = "") -
     return on_cpu and differing(one, other) <= {but}
 
 
+NOT_OURS: Final = ":(exclude,glob)**/site-packages/**"
+"""What virtual environments hold, which may lie in a project without being ignored."""
+
+
 def git_state() -> dict[str, Any] | None:
     """Return {"sha", "dirty"} of the repository around the current folder, or None when git cannot tell.
 
@@ -141,7 +145,7 @@ def git_state() -> dict[str, Any] | None:
     status = _git("status", "--porcelain", "--untracked-files=no")
     if status is None:
         return None
-    status = status or _git("ls-files", "--others", "--exclude-standard", "--", "*.py", "*.xml")
+    status = status or _git("ls-files", "--others", "--exclude-standard", "--", "*.py", "*.xml", NOT_OURS)
     sha = _git("rev-parse", "--verify", "--quiet", "HEAD")
     known = sha is not None and re.fullmatch(r"[0-9a-f]{40,64}", sha) is not None
     return {"sha": sha if known else None, "dirty": bool(status)}

@@ -59,7 +59,7 @@ def plant(fault: type[F], component: Any) -> F:
     """
     if isinstance(component, Fault):
         raise UserError(f"{component.name!r} has a fault already. Plant each fault in a component without one.")
-    replaced = sorted({field.name for field in fields(component)} & (set(dir(fault)) - set(dir(Fault))))
+    replaced = sorted({field.name for field in fields(component)} & (set(dir(fault)) - {"says", *dir(FaultyTask)}))
     if replaced:
         raise UserError(
             f"{fault.__name__} replaces {replaced[0]!r}, a parameter of {component.name!r}. Change parameters with "

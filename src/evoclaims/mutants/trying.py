@@ -52,13 +52,15 @@ class Comparison:
         """
         for one in planted:
             for names, condition in one.conditions.items():
-                pair = [self._trials(each)[0] for each in (self._sound(names), condition)]
-                made = [recorded(trial.provenance, condition.packages) for trial in pair if trial is not None]
-                if len(made) == 2 and (moved := change(*made)):
+                sound, faulty = (
+                    [recorded(trial.provenance, condition.packages) for trial in self._trials(each) if trial]
+                    for each in (self._sound(names), condition)
+                )
+                if other := next((made for made in faulty if sound and made not in sound), None):
                     raise UserError(
                         f"Trials of {' on '.join(names)} with the fault {one.mutant!r} were made with other versions "
-                        f"than those without it ({moved}), so that no difference would show what the fault does. Judge "
-                        "such a store where its versions are installed."
+                        f"than those without it ({change(sound[0], other)}), so that no difference would show what "
+                        "the fault does. Judge such a store where its versions are installed."
                     )
 
     def equivalent(self, names: Names, faulty: Condition, curves: Collection[str]) -> bool:
@@ -130,7 +132,8 @@ def noticed(
     def attempt(report: ClaimReport, one: Planted, touched: Sequence[Names]) -> Attempt | None:
         under = reports[one.name, key_of(report)]
         outcome = under.outcome
-        if under.wants_time or any((one.name, names) in failed for names in touched):
+        late = report.wants_time or under.wants_time
+        if late or any((one.name, names) in failed for names in touched):
             became = Fate.BROKEN
         elif outcome is Outcome.NOT_RUN:
             return None

@@ -166,8 +166,8 @@ class Robustness:
         plain: what the claim counts as under the protocol itself, apart from being insensitive.
         outcomes: the same by variant. No faults are planted there: a claim that notices one under the protocol is not
             vacuous. A variant that changes none of the claim's trials, or whose trials have not run, is left out.
-        fewer: variants that are inconclusive with fewer trials than have decided the protocol's verdict, or since some
-            ran out of time: that may be for want of trials.
+        fewer: variants that are inconclusive with fewer trials than have decided the protocol's verdict, or where
+            trials of either ran out of time: that may be for want of trials.
     """
 
     claim: str
@@ -200,7 +200,7 @@ def matrix(plain: Sequence[ClaimReport], variants: Mapping[str, Sequence[ClaimRe
         varied = {name: found[key] for name in variants if (key := (report.tier, report.name, name)) in found}
         undecided = {name: one.n for name, one in varied.items() if one.outcome is Outcome.INCONCLUSIVE}
         fewer = {name for name, n in undecided.items() if report.outcome is not Outcome.INCONCLUSIVE and n < report.n}
-        fewer |= {name for name, one in varied.items() if one.wants_time}
+        fewer |= {name for name, one in varied.items() if report.wants_time or one.wants_time}
         outcomes = {name: _counted(one, report.tried) for name, one in varied.items()}
         counted = _counted(report, report.tried)
         rows.append(Robustness(report.name, report.tier, counted, outcomes, frozenset(fewer)))

@@ -147,5 +147,7 @@ def _line(one: Succession) -> str:
     ran = f"{one.again} trials run again" if one.again else "run again before"
     pairs = one.pairs
     if not pairs:
-        return f"{one.label}: {ran}, none of which can be compared to the bit (another machine or device)"
+        return (
+            f"{one.label}: {ran}, none of which can be compared to the bit (another machine or device, or out of time)"
+        )
     return f"{one.label}: {ran}, {one.changed} of {len(pairs)} not the same to the bit as before"
