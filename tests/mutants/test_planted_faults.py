@@ -119,7 +119,6 @@ class _Priced(NParity):
 
 
 def test_a_parameter_may_have_the_name_of_a_function_of_ours() -> None:
-    assert plant(faults.Minimizes, CMA_ES).sound == CMA_ES
     assert plant(faults.Blind, _Priced(3)).sound == _Priced(3)
 
 

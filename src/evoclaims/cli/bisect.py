@@ -160,7 +160,7 @@ def _unchanged(first: Judged, last: Judged, kinds: Collection[str]) -> str:
 
 
 def _broken(judged: Judged, claims: Collection[str]) -> set[tuple[str, Outcome]]:
-    """Return the claims that broke, did not run, are missing or want time: no sign of it, unless so at an end."""
+    """Return the claims that broke, did not run, are missing or want time: no sign of a change, unless at an end."""
     late = {name for name, report in judged.reports.items() if report.wants_time}
     return {(name, outcome) for name in claims if not (outcome := judged.outcome(name)).judged or name in late}
 

@@ -34,7 +34,7 @@ PARTS: Final = ("docs", "reproductions", "claims", "pyproject.toml")
 one is not."""
 
 GITIGNORE: Final = "__pycache__/\n.venv/\n"
-"""Else these files are committed, and trials run changed files as soon as Python has written them again."""
+"""Nobody should commit these: Python rewrites them, and trials would then have run changed files."""
 
 NEXT: Final = "next.txt"
 """What to do next, in one or more layers."""

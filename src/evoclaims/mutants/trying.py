@@ -45,7 +45,7 @@ class Comparison:
     used: frozenset[Names]
 
     def check(self, planted: Sequence[Planted]) -> None:
-        """Check that faulty trials were made with the versions of the sound ones, else both are told apart by these.
+        """Check that faulty trials were made with the versions of the sound ones: else these may be what differs.
 
         Raises:
             UserError: when some were not, as where a store comes from elsewhere.

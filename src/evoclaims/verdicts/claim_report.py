@@ -102,7 +102,8 @@ class ClaimReport:
         line: of the paper's source in which the sentence stands; None where the claim does not say.
         asserts: hash of the assertion alone, which two claims with one assertion share; empty where none was judged.
         readings: of the sentence, the judged one first; empty where only that one was judged.
-        satisfied_by: names of the null agents that satisfy the assertion.
+        satisfied_by: names of the null agents that satisfy the assertion. Under a variant only a supported one is put
+            to them.
         unasked: null agents that could not be put to the assertion, each with the reason; no file has them.
         earlier: how its test ended before a plugin ran it again, oldest first; the last run counts.
         chance: of a claim that is inconclusive and was accepted as supported, how often draws from its pilots end so;

@@ -17,7 +17,7 @@ from evoclaims.trials.store import newest
 from evoclaims.verdicts import source_trials
 
 
-def ended(trials: Sequence[TrialResult]) -> tuple[TrialResult, ...]:
+def _in_time(trials: Sequence[TrialResult]) -> tuple[TrialResult, ...]:
     """Return the trials that did not run out of time: nothing is known of others."""
     return tuple(trial for trial in trials if trial.status != "timeout")
 
@@ -52,8 +52,8 @@ class Succession:
     @property
     def pairs(self) -> list[tuple[TrialResult, TrialResult]]:
         """Old and new trials of the same seed that differ only in versions, and both came to an end."""
-        now = {trial.seed: trial for trial in ended(self.now)}
-        both = [(old, now[old.seed]) for old in ended(self.before) if old.seed in now]
+        now = {trial.seed: trial for trial in _in_time(self.now)}
+        both = [(old, now[old.seed]) for old in _in_time(self.before) if old.seed in now]
         return [(old, new) for old, new in both if same_bits(old.provenance, new.provenance, but="versions")]
 
     @property
@@ -119,8 +119,8 @@ def upgrade(successions: Sequence[Succession]) -> Upgrade:
         DriftCase(
             one.label,
             one.now[0].condition,
-            ended(one.now),
-            ended(one.before),
+            _in_time(one.now),
+            _in_time(one.before),
             references.measures(one.now, one.reads),
             method=one.method,
         )
